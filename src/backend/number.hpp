@@ -1,0 +1,90 @@
+// Number types for the physics: double, and Pack, four doubles in SIMD lanes. The same formula serves both through
+// + - * /, fma, sqrt, min, max and select; each lane of a Pack gives the same bits as the double formula, because
+// fma is always spelled out and the compiler is told not to contract on its own (-ffp-contract=off, --fmad=false).
+#pragma once
+#include <cmath>
+
+#include "backend/host_device.hpp"
+#if defined(__AVX__) && !defined(__CUDACC__)
+#include <immintrin.h>
+#endif
+
+namespace moraine {
+
+MORAINE_HD double fma(double a, double b, double c) {
+#if defined(__FMA__) || defined(__CUDA_ARCH__) || defined(__aarch64__)
+  return ::fma(a, b, c);
+#else
+  return a * b + c;  // a processor without fma: emulating it would cost a hundredfold
+#endif
+}
+MORAINE_HD double sqrt(double a) { return ::sqrt(a); }
+MORAINE_HD double min(double a, double b) { return a < b ? a : b; }
+MORAINE_HD double max(double a, double b) { return a > b ? a : b; }
+MORAINE_HD double select(bool mask, double a, double b) { return mask ? a : b; }
+
+#ifndef __CUDACC__
+
+struct Pack {
+  static constexpr int width = 4;
+  using Lanes = double __attribute__((vector_size(32)));
+  using Bits = long long __attribute__((vector_size(32)));
+  Lanes v;
+
+  Pack() = default;
+  Pack(Lanes lanes) : v(lanes) {}
+  Pack(double all) : v(Lanes{all, all, all, all}) {}
+  Pack(double a, double b, double c, double d) : v(Lanes{a, b, c, d}) {}
+
+  // p must be aligned to 32 bytes.
+  static Pack load(const double* p) { return *reinterpret_cast<const Lanes*>(p); }
+  void store(double* p) const { *reinterpret_cast<Lanes*>(p) = v; }
+  double operator[](int lane) const { return v[lane]; }
+
+  friend Pack operator+(Pack a, Pack b) { return a.v + b.v; }
+  friend Pack operator-(Pack a, Pack b) { return a.v - b.v; }
+  friend Pack operator*(Pack a, Pack b) { return a.v * b.v; }
+  friend Pack operator/(Pack a, Pack b) { return a.v / b.v; }
+  friend Pack operator-(Pack a) { return -a.v; }
+  Pack& operator+=(Pack b) { return *this = *this + b; }
+
+  struct Mask {
+    Bits b;
+    friend Mask operator&(Mask a, Mask c) { return {a.b & c.b}; }
+  };
+  friend Mask operator<(Pack a, Pack b) { return {a.v < b.v}; }
+  friend Mask operator>(Pack a, Pack b) { return {a.v > b.v}; }
+  friend Pack select(Mask m, Pack a, Pack b) { return m.b ? a.v : b.v; }
+};
+
+#if defined(__FMA__)
+inline Pack fma(Pack a, Pack b, Pack c) { return _mm256_fmadd_pd(a.v, b.v, c.v); }
+#else
+inline Pack fma(Pack a, Pack b, Pack c) { return a * b + c; }
+#endif
+#if defined(__AVX__)
+inline Pack sqrt(Pack a) { return _mm256_sqrt_pd(a.v); }
+inline Pack round(Pack a) { return _mm256_round_pd(a.v, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC); }
+#else
+inline Pack sqrt(Pack a) { return {::sqrt(a[0]), ::sqrt(a[1]), ::sqrt(a[2]), ::sqrt(a[3])}; }
+inline Pack round(Pack a) { return {::rint(a[0]), ::rint(a[1]), ::rint(a[2]), ::rint(a[3])}; }
+#endif
+inline Pack min(Pack a, Pack b) { return select(a < b, a, b); }
+inline Pack max(Pack a, Pack b) { return select(a > b, a, b); }
+
+// Rows a, b, c, d become columns.
+inline void transpose(Pack& a, Pack& b, Pack& c, Pack& d) {
+  using I = Pack::Bits;
+  const Pack::Lanes ab_low = __builtin_shuffle(a.v, b.v, I{0, 4, 2, 6}), ab_high = __builtin_shuffle(a.v, b.v, I{1, 5, 3, 7});
+  const Pack::Lanes cd_low = __builtin_shuffle(c.v, d.v, I{0, 4, 2, 6}), cd_high = __builtin_shuffle(c.v, d.v, I{1, 5, 3, 7});
+  a = __builtin_shuffle(ab_low, cd_low, I{0, 1, 4, 5});
+  b = __builtin_shuffle(ab_high, cd_high, I{0, 1, 4, 5});
+  c = __builtin_shuffle(ab_low, cd_low, I{2, 3, 6, 7});
+  d = __builtin_shuffle(ab_high, cd_high, I{2, 3, 6, 7});
+}
+
+#endif
+
+MORAINE_HD double round(double a) { return ::rint(a); }
+
+}  // namespace moraine

@@ -1,0 +1,208 @@
+#include "case/case.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "case/keys.hpp"
+#include "case/read.hpp"
+#include "error.hpp"
+
+namespace moraine::cases {
+namespace {
+
+namespace fs = std::filesystem;
+using std::string;
+
+bool is_stage_key(const Key& key) { return key.table() == "stage."; }
+
+// "0; settle, consolidate: 1e4" -> "1e4" for these kinds.
+string fallback_for(const Key& key, const string& kind) {
+  const auto alternatives = split(key.fallback, "; ");
+  for (std::size_t a = 1; a < alternatives.size(); ++a) {
+    const auto parts = split(alternatives[a], ": ");
+    const auto kinds = split(parts[0], ", ");
+    if (std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) return parts[1];
+  }
+  return alternatives[0];
+}
+
+struct Context {
+  const Entries* above;  // keys that a stage may take defaults from
+  string prefix;         // "cases/x/case.toml: stage.shear."
+  string kind;
+};
+
+Value default_value(const Key& key, const Entries& entries, const Context& context) {
+  const string text = fallback_for(key, context.kind);
+  if (!find(text)) return parse_default(key, text);
+  const auto own = entries.find(text);
+  return own != entries.end() ? own->second.value : context.above->at(text).value;
+}
+
+void add_default(const Key& key, Entries& entries, const Context& context) {
+  if (!key.set || entries.contains(key.name)) return;
+  const string name = context.prefix + key.name.substr(is_stage_key(key) ? 6 : 0);
+  if (key.fallback == required) throw error(name, " is missing; expected ", key.accepts);
+  const Value value = default_value(key, entries, context);
+  entries[key.name] = {value, name + " = " + to_toml(value) + " (by default)"};
+}
+
+// The values of one table, by key, and errors about them.
+class Reader {
+ public:
+  explicit Reader(const Entries& entries) : entries_(entries) {}
+  double number(const string& key) const { return std::get<double>(entries_.at(key).value); }
+  string text(const string& key) const { return std::get<string>(entries_.at(key).value); }
+  bool flag(const string& key) const { return std::get<bool>(entries_.at(key).value); }
+
+  template <class... Parts>
+  void expect(bool right, const string& key, const Parts&... parts) const {
+    if (!right) throw error(entries_.at(key).stated, ": expected ", parts...);
+  }
+
+ private:
+  const Entries& entries_;
+};
+
+void check_case(const Entries& entries) {
+  const Reader c(entries);
+  c.expect(c.number("contact.mu_d") <= c.number("contact.mu_s"), "contact.mu_d",
+           "at most contact.mu_s = ", c.number("contact.mu_s"));
+  if (c.text("grains.distribution") == "uniform") {
+    c.expect(c.number("grains.radius_min") > 0, "grains.radius_min", "> 0 m for uniform radii");
+    c.expect(c.number("grains.radius_max") >= c.number("grains.radius_min"), "grains.radius_max",
+             "at least grains.radius_min = ", c.number("grains.radius_min"));
+  }
+  if (c.text("box.periodic").find('z') != string::npos) {
+    c.expect(c.number("box.z") > 0, "box.z", "> 0 m where z is periodic");
+    c.expect(!c.flag("box.floor"), "box.floor", "false where z is periodic");
+  }
+}
+
+void check_stage(const Entries& entries, const Entries& above, const Context& context) {
+  const Reader s(entries);
+  const string kind = context.kind;
+
+  for (const Key& key : keys()) {
+    if (!is_stage_key(key) || key.kinds.empty()) continue;
+    const auto kinds = split(key.kinds, ", ");
+    if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end())
+      s.expect(entries.at(key.name).value == default_value(key, entries, context), key.name,
+               "none: it belongs to kind ", key.kinds, ", and this stage is ", kind);
+  }
+
+  const bool by_strain = s.number("stage.strain") != 0;
+  s.expect(by_strain != (s.number("stage.duration") != 0), by_strain ? "stage.strain" : "stage.duration",
+           kind == "shear" || kind == "uniaxial" ? "either duration or strain" : "a duration > 0 s");
+  if (kind == "shear") {
+    const bool by_rate = s.number("stage.strain_rate") != 0;
+    s.expect(by_rate != (s.number("stage.velocity") != 0), by_rate ? "stage.strain_rate" : "stage.velocity",
+             "either velocity or strain_rate");
+  }
+  if (kind == "uniaxial")
+    s.expect(s.number("stage.strain_rate") != 0, "stage.strain_rate", "other than 0 1/s");
+  if (kind == "shear_stress")
+    s.expect(s.number("stage.shear_stress") != 0, "stage.shear_stress", "other than 0 Pa");
+
+  const string wall = s.text("stage.top_wall");
+  if (kind == "uniaxial")
+    s.expect(wall == "automatic", "stage.top_wall",
+             "automatic: strain_rate drives the wall of a uniaxial stage");
+  const bool by_stress = wall == "stress" || (wall == "automatic" && kind != "settle" && kind != "uniaxial");
+  const double normal_stress = s.number("stage.normal_stress");
+  const double amplitude = s.number("stage.normal_stress_amplitude");
+  if (by_stress) {
+    s.expect(normal_stress > 0, "stage.normal_stress", "> 0 Pa: stress drives the top wall");
+  } else {
+    s.expect(normal_stress == 0, "stage.normal_stress", "0 Pa: no stress drives the top wall of this stage");
+    s.expect(amplitude == 0, "stage.normal_stress_amplitude",
+             "0 Pa: no stress drives the top wall of this stage");
+  }
+  s.expect(std::abs(amplitude) <= normal_stress, "stage.normal_stress_amplitude",
+           "at most normal_stress = ", normal_stress, " Pa: the wall cannot pull");
+  if (amplitude != 0)
+    s.expect(s.number("stage.normal_stress_frequency") > 0, "stage.normal_stress_frequency",
+             "> 0 Hz with an amplitude");
+  if (Reader(above).text("box.periodic").find('z') != string::npos)
+    s.expect(wall == "none" || (wall == "automatic" && kind == "settle"), "stage.top_wall",
+             "none where z is periodic");
+
+  s.expect(s.number("stage.mu_d") <= s.number("stage.mu_s"), "stage.mu_d",
+           "at most mu_s = ", s.number("stage.mu_s"));
+}
+
+// The file that `start` names: itself, or the end of that case.
+fs::path start_file(const fs::path& directory, const Entry& entry) {
+  const string start = std::get<string>(entry.value);
+  if (start.empty()) return {};
+  fs::path path = (directory / start).lexically_normal();
+  if (fs::is_directory(path)) {
+    if (!fs::exists(path / "output/checkpoint.h5"))
+      throw error(entry.stated, ": there is no ", (path / "output/checkpoint.h5").string(),
+                  "; run that case first: moraine run ", path.string());
+    path = (path / "output/checkpoint.h5").lexically_normal();
+  }
+  if (!fs::is_regular_file(path))
+    throw error(entry.stated, ": there is no ", path.string(),
+                "; expected a finished case or a checkpoint, relative to ", directory.string());
+  return path;
+}
+
+string resolved_text(const Draft& draft) {
+  string text, table;
+  const auto add = [&](const Key& key, const Entries& entries) {
+    if (!key.set) return;
+    text += key.name.substr(key.table().size()) + " = " + to_toml(entries.at(key.name).value);
+    text += (key.unit.empty() || key.unit == "1" ? "" : "  # " + key.unit) + "\n";
+  };
+  for (const Key& key : keys()) {
+    if (is_stage_key(key)) continue;
+    if (key.table() != table) {
+      table = key.table();
+      text += "\n[" + table.substr(0, table.size() - 1) + "]\n";
+    }
+    add(key, draft.entries);
+  }
+  for (const StageDraft& stage : draft.stages) {
+    text += "\n[[stage]]\n";
+    for (const Key& key : keys())
+      if (is_stage_key(key)) add(key, stage.entries);
+  }
+  return text;
+}
+
+}  // namespace
+
+Case load(const fs::path& directory, const std::vector<Override>& overrides) {
+  Draft draft = read(directory, overrides);
+  const string file = (directory / "case.toml").string();
+  Case c{};
+  Stage no_stage{};
+  c.directory = directory;
+
+  const Context context{&draft.entries, file + ": ", ""};
+  for (const Key& key : keys()) {
+    if (is_stage_key(key)) continue;
+    add_default(key, draft.entries, context);
+    if (key.set) key.set(key, c, no_stage, draft.entries.at(key.name).value);
+  }
+  check_case(draft.entries);
+  c.start = start_file(directory, draft.entries.at("start"));
+
+  if (draft.stages.empty()) throw error(file, ": no stages; expected at least one [[stage]]");
+  for (StageDraft& s : draft.stages) {
+    Context context{&draft.entries, s.stated + ".", ""};
+    if (s.entries.contains("stage.kind")) context.kind = std::get<string>(s.entries.at("stage.kind").value);
+    Stage& stage = c.stages.emplace_back();
+    for (const Key& key : keys()) {
+      if (!is_stage_key(key)) continue;
+      add_default(key, s.entries, context);
+      key.set(key, c, stage, s.entries.at(key.name).value);
+    }
+    check_stage(s.entries, draft.entries, context);
+  }
+  c.resolved = resolved_text(draft);
+  return c;
+}
+
+}  // namespace moraine::cases

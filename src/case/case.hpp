@@ -1,0 +1,93 @@
+// A case: a directory with case.toml in it, read, merged with what it extends and with --set, and checked.
+// Everything here is SI; units exist only in this folder.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "dem/scene.hpp"
+#include "dem/state.hpp"
+
+namespace moraine::cases {
+
+struct Grains {
+  std::int64_t count;
+  std::string distribution;       // "lognormal", "uniform"
+  double radius_mean;             // m
+  double radius_std;              // m, lognormal
+  double radius_min, radius_max;  // m, uniform
+  double density;                 // kg/m3
+  std::uint64_t seed;
+  std::int64_t columns_x, columns_y;  // of the starting lattice
+  double cell;                        // side of a lattice cell in largest grain diameters
+  bool operator==(const Grains&) const = default;
+};
+
+struct Stage {
+  enum class Kind { settle, consolidate, shear, shear_stress, uniaxial };
+  enum class TopWall { automatic, stress, fixed, none };
+  std::string name;
+  Kind kind;
+  double duration;       // s; 0 where `strain` is given
+  double strain;         // shear strain u t/H_0, or axial strain for uniaxial; 0 where `duration` is given
+  TopWall top_wall;      // automatic: none for settle, prescribed for uniaxial, else stress
+  double normal_stress;  // Pa
+  double normal_stress_amplitude, normal_stress_frequency, normal_stress_phase;  // Pa, Hz, rad
+  double velocity;      // m/s, of the top layer; 0 where strain_rate is given
+  double strain_rate;   // 1/s; times the bed height gives the velocity (shear), or axial rate (uniaxial)
+  double shear_stress;  // Pa, for shear_stress
+  double bottom_layer, top_layer;  // m, thickness by grain centres; negative: one largest diameter
+  bool hold_layer_height;
+  double gamma_n, gamma_t;            // N s/m, between grains
+  double mu_s, mu_d;                  // between grains, in this stage
+  double wall_gamma_n, wall_gamma_t;  // N s/m
+  double wall_mu;
+  bool zero_kinematics;  // velocities, spins and rotations set to zero when the stage begins
+  bool clear_history;    // tangential springs forgotten when the stage begins
+  bool operator==(const Stage&) const = default;
+};
+
+struct Output {
+  double series_interval;      // s of model time
+  double snapshot_interval;    // s of model time
+  double checkpoint_interval;  // s of wall clock
+  bool operator==(const Output&) const = default;
+};
+
+struct Case {
+  std::filesystem::path directory;
+  std::string title;
+  std::filesystem::path start;  // empty, or an HDF5 checkpoint (a case directory given as start is resolved
+                                // to its output/checkpoint.h5)
+  double box_x, box_y, box_z;   // m; 0: from the lattice (x, y)
+  bool periodic_x, periodic_y, periodic_z;
+  bool floor;
+  Grains grains;
+  double k_n, k_t;          // N/m
+  double wall_k_t;          // N/m
+  double wall_mass;         // kg; 0: 0.001 of the mass of N spheres as wide as a lattice cell
+  double gravity;           // m/s2
+  double f;                 // eq. 9
+  double dt;                // s; 0: by eq. 9
+  double neighbour_margin;  // m; 0: automatic
+  bool ledger;
+  std::vector<Stage> stages;
+  Output output;
+
+  std::string resolved;  // the merged case.toml, SI numbers, ready to be written and read again
+  bool operator==(const Case&) const = default;
+};
+
+struct Override {
+  std::string key;    // "model.f", "stage.shear.normal_stress"
+  std::string value;  // TOML, or a bare unit string: 80 kPa
+};
+
+// Throws Error naming file, line, key, value, what was expected and the nearest known key.
+Case load(const std::filesystem::path& directory, const std::vector<Override>& overrides = {});
+
+// The reference of all keys (name, unit, default, meaning), as `moraine keys` prints it.
+std::string reference();
+
+}  // namespace moraine::cases

@@ -1,0 +1,292 @@
+#include "case/keys.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdio>
+#include <numeric>
+#include <type_traits>
+#include <utility>
+
+#include "error.hpp"
+
+namespace moraine::cases {
+namespace {
+
+using std::string;
+using Type = Key::Type;
+
+// Follows pointers to members from Case or Stage down to the field.
+template <auto first, auto... rest>
+auto& field(Case& c, Stage& s) {
+  if constexpr (std::is_invocable_v<decltype(first), Case&>)
+    return ((c.*first).*....*rest);
+  else
+    return ((s.*first).*....*rest);
+}
+
+template <auto... members>
+void set(const Key& key, Case& c, Stage& s, const Value& value) {
+  auto& target = field<members...>(c, s);
+  using T = std::remove_reference_t<decltype(target)>;
+  if constexpr (std::is_enum_v<T>) {  // choices stand in the order of the enumerators
+    const auto choices = split(key.accepts, " | ");
+    target = T(std::find(choices.begin(), choices.end(), std::get<string>(value)) - choices.begin());
+  } else if constexpr (std::is_same_v<T, bool> || std::is_same_v<T, double>) {
+    target = std::get<T>(value);
+  } else if constexpr (std::is_integral_v<T>) {
+    target = T(std::get<std::int64_t>(value));
+  } else {
+    target = std::get<string>(value);
+  }
+}
+
+void set_periodic(const Key&, Case& c, Stage&, const Value& value) {
+  const auto& axes = std::get<string>(value);
+  const auto has = [&](char axis) { return axes != "none" && axes.find(axis) != axes.npos; };
+  c.periodic_x = has('x'), c.periodic_y = has('y'), c.periodic_z = has('z');
+}
+
+void set_nothing(const Key&, Case&, Stage&, const Value&) {}  // only a default for the stages
+
+template <class T>
+Type type_of(const string& accepts) {
+  if (std::is_same_v<T, double>) return Type::number;
+  if (std::is_same_v<T, bool>) return Type::boolean;
+  if (std::is_integral_v<T>) return Type::integer;
+  if (std::is_same_v<T, std::filesystem::path>) return Type::path;
+  return accepts.empty() ? Type::text : Type::choice;
+}
+
+template <auto... members>
+Key row(string name, string unit, string fallback, string accepts, string meaning, string kinds = "") {
+  using T =
+      std::remove_reference_t<decltype(field<members...>(std::declval<Case&>(), std::declval<Stage&>()))>;
+  return {name, type_of<T>(accepts), unit, fallback, accepts, meaning, kinds, set<members...>};
+}
+
+std::vector<Key> make_keys() {
+  using C = Case;
+  using G = Grains;
+  using S = Stage;
+  using O = Output;
+  constexpr auto grains = &C::grains;
+  constexpr auto output = &C::output;
+  const string sheared = "shear, shear_stress", damped = "; settle, consolidate: ";
+  return {
+      // clang-format off
+      row<&C::title>("title", "", "\"\"", "", "what the case is about"),
+      {"extends", Type::text, "", "\"\"", "", "directory of a case whose keys and stages this one takes over", "", nullptr},
+      row<&C::start>("start", "", "\"\"", "", "where the grains come from: a finished case, or a checkpoint file; empty: a loose lattice"),
+      {"stages", Type::list, "", "[]", "", "names of the stages to run, in order; empty: all", "", nullptr},
+
+      row<&C::box_x>("box.x", "m", "0", ">= 0", "side along the shear direction; 0: from the lattice or `start`"),
+      row<&C::box_y>("box.y", "m", "0", ">= 0", "side across; 0: from the lattice or `start`"),
+      row<&C::box_z>("box.z", "m", "0", ">= 0", "height; counts only where z is periodic"),
+      {"box.periodic", Type::choice, "", "\"xy\"", "none | x | y | z | xy | xz | yz | xyz", "periodic sides", "", set_periodic},
+      row<&C::floor>("box.floor", "", "true", "", "fixed wall at z = 0"),
+
+      row<grains, &G::count>("grains.count", "", "10000", "1 .. 2147483647", "number of grains"),
+      row<grains, &G::distribution>("grains.distribution", "", "\"lognormal\"", "lognormal | uniform", "of the radii"),
+      row<grains, &G::radius_mean>("grains.radius_mean", "m", "0.02", "> 0", "lognormal: mean radius"),
+      row<grains, &G::radius_std>("grains.radius_std", "m", "9.38e-5", ">= 0", "lognormal: standard deviation of the radius"),
+      row<grains, &G::radius_min>("grains.radius_min", "m", "0", ">= 0", "uniform: least radius"),
+      row<grains, &G::radius_max>("grains.radius_max", "m", "0", ">= 0", "uniform: largest radius"),
+      row<grains, &G::density>("grains.density", "kg/m3", "2600", "> 0", "of the grains"),
+      row<grains, &G::seed>("grains.seed", "", "1", ">= 0", "of the random radii and places"),
+      row<grains, &G::columns_x>("grains.columns_x", "", "10", ">= 1", "lattice cells along x"),
+      row<grains, &G::columns_y>("grains.columns_y", "", "10", ">= 1", "lattice cells along y"),
+      row<grains, &G::cell>("grains.cell", "1", "2.1", ">= 1.05", "side of a lattice cell in largest grain diameters"),
+
+      row<&C::k_n>("contact.k_n", "N/m", "1.16e9", "> 0", "normal stiffness"),
+      row<&C::k_t>("contact.k_t", "N/m", "1.16e9", ">= 0", "tangential stiffness"),
+      {"contact.gamma_n", Type::number, "N s/m", "0", ">= 0", "normal viscosity; a stage may have its own", "", set_nothing},
+      {"contact.gamma_t", Type::number, "N s/m", "0", ">= 0", "tangential viscosity; a stage may have its own", "", set_nothing},
+      {"contact.mu_s", Type::number, "1", "0.3", ">= 0", "static friction; a stage may have its own", "", set_nothing},
+      {"contact.mu_d", Type::number, "1", "contact.mu_s", ">= 0", "dynamic friction, at most mu_s; a stage may have its own", "", set_nothing},
+
+      row<&C::wall_k_t>("wall.k_t", "N/m", "0", ">= 0", "tangential stiffness against walls; k_n is that of contacts"),
+      row<&C::wall_mass>("wall.mass", "kg", "0", ">= 0", "of the top wall; 0: 0.001 of the mass of N spheres as wide as a lattice cell"),
+
+      row<&C::gravity>("model.gravity", "m/s2", "9.80665", ">= 0", "along -z"),
+      row<&C::f>("model.f", "1", "0.075", "> 0", "time step in units of sqrt(min m / max(k_n, k_t))"),
+      row<&C::dt>("model.dt", "s", "0", ">= 0", "time step; 0: by f"),
+      row<&C::neighbour_margin>("model.neighbour_margin", "m", "0", ">= 0", "of the neighbour list; 0: automatic; changes no result"),
+      row<&C::ledger>("model.ledger", "", "true", "", "account for every joule"),
+
+      row<&S::name>("stage.name", "", required, "", "unique; letters, digits, - and _"),
+      row<&S::kind>("stage.kind", "", required, "settle | consolidate | shear | shear_stress | uniaxial", "what is done to the bed"),
+      row<&S::duration>("stage.duration", "s", "0", ">= 0", "of the stage; this or strain"),
+      row<&S::strain>("stage.strain", "1", "0", ">= 0", "where the stage ends: u t/H_0, or axial; magnitude", "shear, uniaxial"),
+      row<&S::top_wall>("stage.top_wall", "", "\"automatic\"", "automatic | stress | fixed | none", "automatic: none to settle, driven in uniaxial, else stress"),
+      row<&S::normal_stress>("stage.normal_stress", "Pa", "0", ">= 0", "on the top wall"),
+      row<&S::normal_stress_amplitude>("stage.normal_stress_amplitude", "Pa", "0", "", "of a sinusoid added to normal_stress"),
+      row<&S::normal_stress_frequency>("stage.normal_stress_frequency", "Hz", "0", ">= 0", "of that sinusoid"),
+      row<&S::normal_stress_phase>("stage.normal_stress_phase", "rad", "0", "", "of that sinusoid when the stage begins"),
+      row<&S::velocity>("stage.velocity", "m/s", "0", "", "of the top layer; this or strain_rate", "shear"),
+      row<&S::strain_rate>("stage.strain_rate", "1/s", "0", "", "velocity over bed height, or axial", "shear, uniaxial"),
+      row<&S::shear_stress>("stage.shear_stress", "Pa", "0", "", "that drives the top layer", "shear_stress"),
+      row<&S::bottom_layer>("stage.bottom_layer", "m", "-1", "", "thickness of the layer that stands still; negative: one largest diameter", sheared),
+      row<&S::top_layer>("stage.top_layer", "m", "-1", "", "thickness of the driven layer; negative: one largest diameter", sheared),
+      row<&S::hold_layer_height>("stage.hold_layer_height", "", "false", "", "the layers keep their height too", sheared),
+      row<&S::gamma_n>("stage.gamma_n", "N s/m", "contact.gamma_n", ">= 0", "normal viscosity"),
+      row<&S::gamma_t>("stage.gamma_t", "N s/m", "contact.gamma_t", ">= 0", "tangential viscosity"),
+      row<&S::mu_s>("stage.mu_s", "1", "contact.mu_s", ">= 0", "static friction"),
+      row<&S::mu_d>("stage.mu_d", "1", "contact.mu_d", ">= 0", "dynamic friction, at most mu_s"),
+      row<&S::wall_gamma_n>("stage.wall_gamma_n", "N s/m", "0" + damped + "1e4", ">= 0", "normal viscosity against walls"),
+      row<&S::wall_gamma_t>("stage.wall_gamma_t", "N s/m", "0" + damped + "1e4", ">= 0", "tangential viscosity against walls"),
+      row<&S::wall_mu>("stage.wall_mu", "1", "0" + damped + "stage.mu_d", ">= 0", "friction against walls"),
+      row<&S::zero_kinematics>("stage.zero_kinematics", "", "true", "", "velocities, spins and rotations begin at zero"),
+      row<&S::clear_history>("stage.clear_history", "", "false", "", "tangential springs are forgotten when the stage begins"),
+
+      row<output, &O::series_interval>("output.series_interval", "s", "0.05", "> 0", "of model time"),
+      row<output, &O::snapshot_interval>("output.snapshot_interval", "s", "0.5", "> 0", "of model time"),
+      row<output, &O::checkpoint_interval>("output.checkpoint_interval", "s", "60", "> 0", "of wall clock"),
+      // clang-format on
+  };
+}
+
+// Levenshtein: insertions, deletions and substitutions from one word to the other.
+std::size_t edit_distance(const string& a, const string& b) {
+  std::vector<std::size_t> d(b.size() + 1);
+  std::iota(d.begin(), d.end(), 0);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = d[0];
+    d[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t substituted = diagonal + (a[i] != b[j]);
+      diagonal = d[j + 1];
+      d[j + 1] = std::min({substituted, d[j] + 1, d[j + 1] + 1});
+    }
+  }
+  return d.back();
+}
+
+string leaf(const string& name) { return name.substr(name.find('.') + 1); }
+
+bool in_range(const string& range, double value) {
+  if (const auto dots = range.find(" .. "); dots != range.npos)
+    return std::stod(range.substr(0, dots)) <= value && value <= std::stod(range.substr(dots + 4));
+  if (range.starts_with(">= ")) return value >= std::stod(range.substr(3));
+  if (range.starts_with("> ")) return value > std::stod(range.substr(2));
+  return true;
+}
+
+string quoted(const string& text) {
+  string out = "\"";
+  for (const char c : text)
+    if (c == '"' || c == '\\')
+      out += '\\', out += c;
+    else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
+      char code[8];
+      std::snprintf(code, sizeof code, "\\u%04X", c);
+      out += code;
+    } else
+      out += c;
+  return out + '"';
+}
+
+}  // namespace
+
+const std::vector<Key>& keys() {
+  static const std::vector<Key> table = make_keys();
+  return table;
+}
+
+const Key* find(const string& name) {
+  const auto k = std::find_if(keys().begin(), keys().end(), [&](const Key& key) { return key.name == name; });
+  return k == keys().end() ? nullptr : &*k;
+}
+
+void check_range(const Key& key, const Value& value) {
+  if (key.type == Type::choice) {
+    const auto choices = split(key.accepts, " | ");
+    const auto& text = std::get<string>(value);
+    if (std::find(choices.begin(), choices.end(), text) == choices.end()) {
+      const string near = nearest(text, choices);
+      throw error("expected ", key.accepts, near.empty() ? "" : "; did you mean " + near + "?");
+    }
+  }
+  const double* number = std::get_if<double>(&value);
+  const std::int64_t* integer = std::get_if<std::int64_t>(&value);
+  if ((number && !in_range(key.accepts, *number)) || (integer && !in_range(key.accepts, double(*integer))))
+    throw error("expected ", key.accepts, key.unit.empty() || key.unit == "1" ? "" : " " + key.unit);
+}
+
+string suggestion(const string& unknown_key, const string& shown) {
+  const string table = unknown_key.substr(0, unknown_key.find('.') + 1), unknown = leaf(unknown_key);
+  std::vector<string> siblings, others;
+  for (const Key& key : keys()) {
+    if (key.table() == table) siblings.push_back(leaf(key.name));
+    others.push_back(key.name);
+    // The right name in the wrong table.
+    if (key.table() != table && leaf(key.name) == unknown) return "did you mean " + key.name + "?";
+  }
+  if (const string near = nearest(unknown, siblings); !near.empty())
+    return "did you mean " + (shown.empty() ? table : shown) + near + "?";
+  if (siblings.empty()) {
+    const string near = nearest(unknown_key, others);
+    return near.empty() ? "`moraine keys` lists all" : "did you mean " + near + "?";
+  }
+  return "known here: " + join(siblings, ", ");
+}
+
+string nearest(const string& word, const std::vector<string>& known) {
+  string best;
+  std::size_t least = (word.size() + 2) / 3 + 1;
+  for (const string& k : known)
+    if (const auto d = edit_distance(word, k); d < std::min(least, k.size())) least = d, best = k;
+  return best;
+}
+
+std::vector<string> split(const string& text, const string& separator) {
+  std::vector<string> parts;
+  std::size_t begin = 0;
+  for (std::size_t end; (end = text.find(separator, begin)) != text.npos; begin = end + separator.size())
+    parts.push_back(text.substr(begin, end - begin));
+  parts.push_back(text.substr(begin));
+  return parts;
+}
+
+string join(const std::vector<string>& parts, const string& separator) {
+  string text;
+  for (const string& part : parts) text += (text.empty() ? "" : separator) + part;
+  return text;
+}
+
+string to_toml(const Value& value) {
+  if (const auto* text = std::get_if<string>(&value)) return quoted(*text);
+  if (const auto* flag = std::get_if<bool>(&value)) return *flag ? "true" : "false";
+  if (const auto* integer = std::get_if<std::int64_t>(&value)) return std::to_string(*integer);
+  if (const auto* list = std::get_if<std::vector<string>>(&value)) {
+    std::vector<string> parts;
+    for (const string& part : *list) parts.push_back(quoted(part));
+    return "[" + join(parts, ", ") + "]";
+  }
+  char buffer[32];
+  string text(buffer, std::to_chars(buffer, buffer + sizeof buffer, std::get<double>(value)).ptr);
+  return text.find_first_of(".en") == text.npos ? text + ".0" : text;
+}
+
+string reference() {
+  const auto pad = [](string text, std::size_t width) {
+    text.resize(std::max(text.size() + 1, width), ' ');
+    return text;
+  };
+  string out =
+      "The keys of case.toml: name, default and unit, meaning, (what is accepted), [kinds of stage].\n"
+      "A value is a number in SI units or a text with a unit, such as \"80 kPa\".\n";
+  string table;
+  for (const Key& key : keys()) {
+    if (key.table() != table) {
+      table = key.table();
+      const string name = table.substr(0, table.size() - 1);
+      out += table == "stage." ? "\n[[stage]]\n" : "\n[" + name + "]\n";
+    }
+    out += "  " + pad(leaf(key.name), 25) + pad(key.fallback + (key.unit == "1" ? "" : " " + key.unit), 35) +
+           key.meaning + (key.accepts.empty() ? "" : " (" + key.accepts + ")") +
+           (key.kinds.empty() ? "" : " [" + key.kinds + "]") + "\n";
+  }
+  return out;
+}
+
+}  // namespace moraine::cases

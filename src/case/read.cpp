@@ -1,0 +1,301 @@
+#include "case/read.hpp"
+
+#include <toml++/toml.h>
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "case/units.hpp"
+#include "error.hpp"
+
+namespace moraine::cases {
+namespace {
+
+namespace fs = std::filesystem;
+using std::string;
+using Type = Key::Type;
+
+// Words of an Error, behind what they are about.
+template <class Action>
+decltype(auto) about(const string& stated, Action&& action) {
+  try {
+    return action();
+  } catch (const Error& e) {
+    throw error(stated, ": ", e.what());
+  }
+}
+
+string text_of(const toml::node& node) {
+  if (const auto number = node.value_exact<double>()) return to_toml(*number);
+  if (const auto words = node.value_exact<string>()) return to_toml(*words);
+  std::ostringstream text;
+  node.visit([&](const auto& n) { text << n; });
+  return text.str();
+}
+
+std::vector<string> words(const toml::node& node) {
+  std::vector<string> list;
+  if (const toml::array* array = node.as_array())
+    for (const toml::node& element : *array)
+      if (const auto word = element.value_exact<string>()) list.push_back(*word);
+  if (!node.is_array() || list.size() != node.as_array()->size())
+    throw error("expected a list of texts, such as [\"settle\", \"shear\"]");
+  return list;
+}
+
+double number(const Key& key, const toml::node& node) {
+  const bool pure = key.unit == "1" || key.unit.empty();
+  double value = 0;
+  if (node.is_number())
+    value = *node.value<double>();
+  else if (node.is_string() && !key.unit.empty())
+    value = to_si(*node.value<string>(), key.unit);
+  else
+    throw error("expected ", key.type == Type::integer ? "an integer" : "a number",
+                pure ? "" : " in " + key.unit + ", or a text with a unit");
+  if (!std::isfinite(value)) throw error("expected a finite number");
+  return value + 0.0;  // no negative zero
+}
+
+Value convert(const Key& key, const toml::node& node) {
+  switch (key.type) {
+    case Type::number:
+      return number(key, node);
+    case Type::integer: {
+      if (const auto integer = node.value_exact<std::int64_t>()) return *integer;
+      const double value = number(key, node);  // 1e4 is a float to TOML
+      if (value != std::floor(value) || std::abs(value) > 0x1p53) throw error("expected an integer");
+      return std::int64_t(value);
+    }
+    case Type::boolean:
+      if (!node.is_boolean()) throw error("expected true or false");
+      return *node.value<bool>();
+    case Type::list:
+      return words(node);
+    default:
+      if (!node.is_string())
+        throw error("expected ", key.accepts.empty() ? "a text in quotes" : "one of " + key.accepts);
+      return *node.value<string>();
+  }
+}
+
+Value checked(const Key& key, const toml::node& node) {
+  const Value value = convert(key, node);
+  check_range(key, value);
+  return value;
+}
+
+// What a person types after --set: TOML, or a text without quotes.
+Value parse_bare(const Key& key, const string& text) {
+  const bool is_text = key.type == Type::text || key.type == Type::choice || key.type == Type::path;
+  try {
+    const toml::table t = toml::parse("v = " + text);
+    const toml::node* node = t.get("v");
+    if (node && t.size() == 1 && (!is_text || node->is_string())) return checked(key, *node);
+  } catch (const toml::parse_error&) {
+  }
+  return checked(key, toml::value<string>(text));
+}
+
+string& text_in(Entry& entry) { return std::get<string>(entry.value); }
+
+// "name" of a stage, or an error that lists them.
+StageDraft& stage(Draft& draft, const string& name) {
+  std::vector<string> names;
+  for (StageDraft& s : draft.stages) {
+    if (s.name == name) return s;
+    names.push_back(s.name);
+  }
+  throw error("no stage \"", name, "\"; stages: ", join(names, ", "));
+}
+
+void select_stages(Draft& draft) {
+  const auto found = draft.entries.find("stages");
+  if (found == draft.entries.end()) return;
+  const Entry entry = found->second;
+  draft.entries.erase(found);
+  const auto names = std::get<std::vector<string>>(entry.value);
+  if (names.empty()) return;
+  std::vector<StageDraft> chosen;
+  for (const string& name : names) {
+    if (std::count(names.begin(), names.end(), name) > 1)
+      throw error(entry.stated, ": \"", name, "\" is there twice");
+    chosen.push_back(about(entry.stated, [&] { return stage(draft, name); }));
+  }
+  draft.stages = chosen;
+}
+
+class File {
+ public:
+  File(const fs::path& directory, const fs::path& root) : directory_(directory), root_(root) {
+    if (!fs::is_regular_file(path()))
+      throw error(path().string(), ": not found; a case is a directory that holds a case.toml");
+    try {
+      table_ = toml::parse_file(path().string());
+    } catch (const toml::parse_error& e) {
+      throw error(path().string(), ":", e.source().begin.line, ": ", e.description());
+    }
+  }
+
+  fs::path path() const { return directory_ / "case.toml"; }
+
+  // "" or the directory of the case that this one extends, and the words for errors about it.
+  std::pair<string, string> extends() const {
+    const toml::node* node = table_.get("extends");
+    if (!node) return {};
+    Entry entry = read(*find("extends"), "extends", *node);
+    return {text_in(entry), entry.stated};
+  }
+
+  void merge_into(Draft& draft) const {
+    for (const auto& [name, node] : table_) {
+      const string table = string(name.str());
+      if (table == "stage")
+        merge_stages(node, draft);
+      else if (table != "extends")
+        merge_key(table, node, draft);
+    }
+    select_stages(draft);
+  }
+
+ private:
+  string at(const toml::node& node) const {
+    return path().string() + ":" + std::to_string(node.source().begin.line) + ": ";
+  }
+
+  Entry read(const Key& key, const string& name, const toml::node& node) const {
+    Entry entry{{}, at(node) + name + " = " + text_of(node)};
+    entry.value = about(entry.stated, [&] { return checked(key, node); });
+    // A path means the same file to the case that inherits it.
+    if (key.type == Type::path && !text_in(entry).empty() && directory_ != root_)
+      text_in(entry) = fs::proximate(directory_ / text_in(entry), root_).string();
+    return entry;
+  }
+
+  static bool is_table(const string& name) {
+    return std::any_of(keys().begin(), keys().end(),
+                       [&](const Key& key) { return key.table() == name + "."; });
+  }
+
+  // A key on top of the file, or a table of keys.
+  void merge_key(const string& name, const toml::node& node, Draft& draft) const {
+    if (is_table(name)) {
+      if (!node.is_table())
+        throw error(at(node), name, " = ", text_of(node), ": expected a table, [", name, "]");
+      for (const auto& [leaf, value] : *node.as_table())
+        merge_leaf(name + "." + string(leaf.str()), value, draft);
+    } else if (node.is_table() || node.is_array_of_tables()) {
+      std::vector<string> tables;
+      for (const Key& key : keys())
+        if (const string t = split(key.table(), ".")[0]; !t.empty() && (tables.empty() || tables.back() != t))
+          tables.push_back(t);
+      const string near = nearest(name, tables);
+      throw error(at(node), "[", name, "]: unknown table; ",
+                  near.empty() ? "known: " + join(tables, ", ") : "did you mean [" + near + "]?");
+    } else {
+      merge_leaf(name, node, draft);
+    }
+  }
+
+  void merge_leaf(const string& name, const toml::node& node, Draft& draft) const {
+    const Key* key = find(name);
+    if (!key) throw error(at(node), name, " = ", text_of(node), ": unknown key; ", suggestion(name));
+    draft.entries[name] = read(*key, name, node);
+  }
+
+  void merge_stages(const toml::node& node, Draft& draft) const {
+    const toml::array* stages = node.as_array();
+    if (!stages || !std::all_of(stages->begin(), stages->end(), [](auto& s) { return s.is_table(); }))
+      throw error(at(node), "stage: expected stages, each headed by [[stage]]");
+    std::vector<string> seen;
+    for (const toml::node& element : *stages) {
+      const toml::table& table = *element.as_table();
+      const toml::node* name_node = table.get("name");
+      if (!name_node) throw error(at(element), "stage.name is missing; expected name = \"...\", unique");
+      Entry name_entry = read(*find("stage.name"), "stage.name", *name_node);
+      const string name = text_in(name_entry);
+      if (name.empty() ||
+          name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_") !=
+              name.npos)
+        throw error(name_entry.stated, ": expected letters, digits, - and _");
+      if (std::count(seen.begin(), seen.end(), name))
+        throw error(name_entry.stated, ": there is another stage of this name; expected a unique one");
+      seen.push_back(name);
+
+      auto target =
+          std::find_if(draft.stages.begin(), draft.stages.end(), [&](auto& s) { return s.name == name; });
+      if (target == draft.stages.end())
+        target = draft.stages.insert(target, {name, at(element) + "stage." + name, {}});
+      for (const auto& [leaf, value] : table) {
+        const string key_name = "stage." + string(leaf.str()),
+                     shown = "stage." + name + "." + string(leaf.str());
+        const Key* key = find(key_name);
+        if (!key)
+          throw error(at(value), shown, " = ", text_of(value), ": unknown key; ",
+                      suggestion(key_name, "stage." + name + "."));
+        target->entries[key_name] = read(*key, shown, value);
+      }
+    }
+  }
+
+  fs::path directory_, root_;
+  toml::table table_;
+};
+
+// `chain` holds the cases that led here.
+Draft read_file(const fs::path& directory, const fs::path& root, std::vector<fs::path> chain) {
+  const File file(directory, root);
+  Draft draft;
+  chain.push_back(fs::weakly_canonical(directory));
+  if (const auto [base, stated] = file.extends(); !base.empty()) {
+    const fs::path base_directory = (directory / base).lexically_normal();
+    const auto again = std::find(chain.begin(), chain.end(), fs::weakly_canonical(base_directory));
+    if (again != chain.end()) {
+      std::vector<string> names;
+      for (auto c = again; c != chain.end(); ++c) names.push_back(c->filename().string());
+      names.push_back(again->filename().string());
+      throw error(stated, ": the cases extend each other in a circle: ", join(names, " -> "));
+    }
+    if (!fs::is_regular_file(base_directory / "case.toml"))
+      throw error(stated, ": expected a directory that holds a case.toml, relative to ", directory.string());
+    draft = read_file(base_directory, root, chain);
+  }
+  file.merge_into(draft);
+  return draft;
+}
+
+void set(Draft& draft, const Override& o) {
+  const string stated = "--set " + o.key + "=" + o.value;
+  if (o.key.starts_with("stage.")) {
+    const auto dot = o.key.rfind('.');
+    const string name = dot < 6 ? o.key.substr(6) : o.key.substr(6, dot - 6),
+                 key_name = "stage." + o.key.substr(dot + 1);
+    StageDraft& target = about(stated, [&]() -> StageDraft& { return stage(draft, name); });
+    const Key* key = find(key_name);
+    if (!key) throw error(stated, ": unknown key; ", suggestion(key_name, "stage." + name + "."));
+    if (key_name == "stage.name") throw error(stated, ": a stage keeps its name");
+    target.entries[key_name] = {about(stated, [&] { return parse_bare(*key, o.value); }), stated};
+  } else {
+    const Key* key = find(o.key);
+    if (!key) throw error(stated, ": unknown key; ", suggestion(o.key));
+    if (key->name == "extends") throw error(stated, ": only case.toml can say what it extends");
+    draft.entries[o.key] = {about(stated, [&] { return parse_bare(*key, o.value); }), stated};
+  }
+}
+
+}  // namespace
+
+Draft read(const fs::path& directory, const std::vector<Override>& overrides) {
+  Draft draft = read_file(directory, directory, {});
+  // `stages` first: a stage that does not run is none to set keys of.
+  for (const Override& o : overrides)
+    if (!o.key.starts_with("stage.")) set(draft, o);
+  select_stages(draft);
+  for (const Override& o : overrides)
+    if (o.key.starts_with("stage.")) set(draft, o);
+  return draft;
+}
+
+Value parse_default(const Key& key, const string& toml) { return parse_bare(key, toml); }
+
+}  // namespace moraine::cases

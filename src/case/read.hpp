@@ -1,0 +1,36 @@
+// case.toml as it stands after `extends`, `stages` and --set: every value typed, in SI, within its range, and
+// with the place it came from. What depends on several keys is checked in case.cpp.
+#pragma once
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "case/keys.hpp"
+
+namespace moraine::cases {
+
+struct Entry {
+  Value value;
+  std::string stated;  // for messages: "cases/x/case.toml:14: contact.mu_s = 0.3"
+};
+using Entries = std::map<std::string, Entry>;  // by name in the table of keys
+
+struct StageDraft {
+  std::string name;
+  std::string stated;  // "cases/x/case.toml:20: stage.shear", where it first appears
+  Entries entries;
+};
+
+struct Draft {
+  Entries entries;
+  std::vector<StageDraft> stages;
+};
+
+// Throws Error, see case.hpp.
+Draft read(const std::filesystem::path& directory, const std::vector<Override>& overrides);
+
+// The value of a default written in the table of keys.
+Value parse_default(const Key& key, const std::string& toml);
+
+}  // namespace moraine::cases

@@ -1,0 +1,74 @@
+// What pushes the bed from outside: the top wall and the layer of driven grains, and the account of the energy they give
+// and the contacts take. One small struct of numbers; every thread advances a copy of its own and all stay equal.
+#pragma once
+#include "dem/scene.hpp"
+#include "dem/state.hpp"
+
+namespace moraine::dem {
+
+// Sums over grains at one step, each in a fixed order.
+struct Reaction {
+  double wall_force = 0;   // N, on the top wall, upwards
+  double shear_force = 0;  // N, x force on the top layer
+};
+struct Dissipation {
+  double slip = 0;           // J, in the step
+  double viscous_power = 0;  // W
+};
+
+struct Drive {
+  double wall_z = 0, wall_v = 0, wall_dz = 0;  // dz: of the last step
+  double layer_u = 0, layer_mass = 0;
+  Reaction at, before;                 // at the present step and one earlier
+  double sigma = 0, sigma_before = 0;  // Pa, asked of the wall
+  Ledger ledger;
+  std::int64_t step = 0;
+
+  // Takes the forces of the present step and closes the account of the step that led to it. Work is counted with the
+  // mean of the forces before and after, as leapfrog does it.
+  MORAINE_HD void close(const Scene& s, const Reaction& reaction) {
+    take(s, reaction);
+    const double area = s.box.x * s.box.y;
+    if (s.top_wall.drive == TopWall::Drive::stress) ledger.top_wall -= 0.5 * (sigma_before + sigma) * area * wall_dz;
+    if (s.top_wall.drive == TopWall::Drive::velocity)
+      ledger.top_wall -= 0.5 * (before.wall_force + at.wall_force) * wall_dz;
+    if (s.shear.drive == Shear::Drive::velocity)
+      ledger.layers -= 0.5 * (before.shear_force + at.shear_force) * layer_u * s.dt;
+    if (s.shear.drive == Shear::Drive::stress) ledger.layers += s.shear.stress * area * layer_u * s.dt;
+  }
+  MORAINE_HD void account(const Scene& s, const Dissipation& d) {
+    ledger.slip += d.slip;
+    ledger.viscous += 0.5 * (ledger.viscous_power + d.viscous_power) * s.dt;
+    ledger.viscous_power = d.viscous_power;
+  }
+  MORAINE_HD void take(const Scene& s, const Reaction& reaction) {
+    at = reaction;
+    sigma = s.normal_stress(static_cast<double>(step) * s.dt);
+  }
+
+  // Wall and layer from step n to n + 1 (velocities from n - 1/2 to n + 1/2).
+  MORAINE_HD void advance(const Scene& s) {
+    before = at;
+    sigma_before = sigma;
+    wall_v = fma(wall_acceleration(s), s.dt, wall_v);
+    wall_dz = wall_v * s.dt;
+    wall_z += wall_dz;
+    layer_u = fma(layer_acceleration(s), s.dt, layer_u);
+    ++step;
+  }
+  MORAINE_HD void half_step(const Scene& s, double sign) {
+    wall_v = fma(wall_acceleration(s), sign * 0.5 * s.dt, wall_v);
+    layer_u = fma(layer_acceleration(s), sign * 0.5 * s.dt, layer_u);
+  }
+
+  MORAINE_HD double wall_acceleration(const Scene& s) const {
+    if (s.top_wall.drive != TopWall::Drive::stress) return 0;
+    return (at.wall_force - sigma * (s.box.x * s.box.y)) / s.top_wall.mass;
+  }
+  MORAINE_HD double layer_acceleration(const Scene& s) const {
+    if (s.shear.drive != Shear::Drive::stress) return 0;
+    return (s.shear.stress * (s.box.x * s.box.y) + at.shear_force) / layer_mass;
+  }
+};
+
+}  // namespace moraine::dem

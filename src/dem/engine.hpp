@@ -1,0 +1,48 @@
+// What moves the grains. Two engines share one physics (contact.hpp, integrate.hpp): PairEngine for the CPU walks pairs in
+// SIMD packs; GatherEngine for the GPU lets each grain walk its own contacts (it also runs on the host, for tests).
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "dem/scene.hpp"
+#include "dem/state.hpp"
+
+namespace moraine::dem {
+
+class Engine {
+ public:
+  virtual ~Engine() = default;
+
+  // Takes the state over. One that is not staggered gets its forces evaluated (springs as they are) and its
+  // velocities taken half a step back; all others go on with the same bits. Throws Error on an unsupported scene.
+  virtual void load(const Scene& scene, const State& state) = 0;
+
+  // Advances so many steps. Throws Error naming grain, step and place when a number stops being finite or a grain leaves.
+  virtual void advance(std::int64_t steps) = 0;
+
+  // The staggered state at the present step.
+  virtual State state() const = 0;
+
+  struct Counts {
+    std::int64_t candidates = 0;  // pairs within the neighbour margin
+    std::int64_t near = 0;        // pairs evaluated at each step
+    std::int64_t rebuilds = 0;    // of the candidates
+  };
+  virtual Counts counts() const = 0;
+  virtual std::string describe() const = 0;  // e.g. "cpu, 2 threads, AVX2"
+  virtual int threads() const = 0;
+};
+
+enum class Backend { automatic, cpu, cuda, reference };  // reference: the GPU's loop on the host
+
+// threads = 0: one for each core that this process may use. Throws Error where the backend is not built in or has no device.
+std::unique_ptr<Engine> make_engine(Backend backend, int threads = 0);
+
+bool cuda_built();
+bool cuda_device_present();
+
+// Velocities and spins from n - 1/2 to n, as between stages.
+void synchronise(const Scene& scene, State& state);
+
+}  // namespace moraine::dem

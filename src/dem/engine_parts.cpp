@@ -1,0 +1,128 @@
+#include "dem/engine_parts.hpp"
+
+#include <algorithm>
+#include <tuple>
+
+namespace moraine::dem {
+
+void check_scene(const Scene& s, const State& state) {
+  if (state.size() == 0) throw error("there are no grains");
+  if (!(s.dt > 0)) throw error("time step = ", s.dt, " s: expected a positive number");
+  if (s.periodic_z && (s.floor || s.top_wall.drive != TopWall::Drive::none))
+    throw error("sides periodic along z leave no room for a floor or a top wall: take z out of box.periodic, or the walls away");
+  if (s.top_wall.drive == TopWall::Drive::stress && !(s.top_wall.mass > 0))
+    throw error("top wall mass = ", s.top_wall.mass, " kg: expected a positive number");
+  const double r_max = *std::max_element(state.r.begin(), state.r.end());
+  const Vec3d side = Sides::of(s).side;
+  const double least = 4 * r_max + 2 * neighbour_margin(s, state);
+  for (int a = 0; a < 3; ++a)
+    if (side[a] > 0 && side[a] < least)
+      throw error("box.", "xyz"[a], " = ", side[a], " m is too narrow for a periodic side: two grains would touch on both sides; "
+                  "expected at least ", least, " m (two largest diameters and the neighbour margin)");
+  if (s.shear.drive == Shear::Drive::stress && std::count(state.role.begin(), state.role.end(), Role::top) == 0)
+    throw error("a stress is to drive the top layer, but there are no grains in it");
+}
+
+double neighbour_margin(const Scene& scene, const State& state) {
+  if (scene.neighbour_margin > 0) return scene.neighbour_margin;
+  double sum = 0;
+  for (const double r : state.r) sum += r;
+  return 0.05 * sum / state.size();
+}
+
+std::vector<GrainRow> grain_rows(const Scene& scene, const State& s) {
+  std::vector<GrainRow> rows(s.size());
+  for (Index i = 0; i < s.size(); ++i) {
+    GrainRow& g = rows[i];
+    g = {s.x[i], s.r[i], s.v[i], s.r[i], s.omega[i], 0};
+    if (s.role[i] == Role::free) continue;
+    const double u = s.role[i] == Role::bottom ? 0
+                     : scene.shear.drive == Shear::Drive::velocity ? scene.shear.velocity : s.layer_u;
+    g.v = {u, 0, scene.shear.hold_z ? 0 : s.v[i].z};
+    g.omega = {0, 0, 0};
+  }
+  return rows;
+}
+
+Drive drive_of(const Scene& scene, const State& s) {
+  Drive d;
+  d.wall_z = s.wall_z;
+  d.wall_v = scene.top_wall.drive == TopWall::Drive::velocity ? scene.top_wall.velocity : s.wall_v;
+  d.layer_u = scene.shear.drive == Shear::Drive::velocity ? scene.shear.velocity : s.layer_u;
+  for (Index i = 0; i < s.size(); ++i)
+    if (s.role[i] == Role::top) d.layer_mass += sphere_mass(scene.density, s.r[i]);
+  d.step = s.step;
+  d.ledger = s.ledger;
+  d.take(scene, {s.wall_force, s.shear_force});
+  return d;
+}
+
+Error lost_grain(const Scene& scene, const Drive& drive, const GrainRow& g, Index id) {
+  std::ostringstream place;
+  place.precision(9);
+  place << "grain " << id << " at step " << drive.step << " (t = " << static_cast<double>(drive.step) * scene.dt
+        << " s of the stage), position (" << g.x.x << ", " << g.x.y << ", " << g.x.z << ") m, velocity (" << g.v.x << ", "
+        << g.v.y << ", " << g.v.z << ") m/s: ";
+  const char* remedy = "; the step may be too long for the stiffness, or grains overlapped deeply: try a smaller model.f";
+  if (!(dot(g.x, g.x) + dot(g.v, g.v) + dot(g.omega, g.omega) < 1e300))
+    return error(place.str(), "not a finite number", remedy);
+  if (scene.floor && g.x.z < -g.r) return error(place.str(), "fell through the floor", remedy);
+  return error(place.str(), "passed through the top wall (at ", drive.wall_z, " m)", remedy);
+}
+
+void half_step_back(GrainRow& g, const Mobility& m, const Vec3d& f, const Vec3d& torque, double dt) {
+  g.v = axpy(-0.5 * dt, m.acceleration(f), g.v);
+  g.omega = axpy(-0.5 * dt, m.spin_acceleration(torque), g.omega);
+}
+
+void append_grain(State& s, const GrainRow& g, const Vec3d& rotation, const LoadRow& load, Role role) {
+  s.r.push_back(g.r);
+  s.x.push_back(g.x);
+  s.v.push_back(g.v);
+  s.omega.push_back(g.omega);
+  s.rotation.push_back(rotation);
+  s.force.push_back(load.f);
+  s.torque.push_back(load.torque);
+  s.role.push_back(role);
+}
+
+void append_contact(State& s, const Scene& scene, const Sides& sides, const GrainRow& a, const GrainRow& b, Index i,
+                    Index j, const Spring<double>& spring) {
+  if (!(between_grains(nearest_image(sides, a.x - b.x), a.r + b.r, a.r - b.r).delta_n < 0)) return;
+  s.contacts.push_back({i, j, scene.grain.k_t > 0 ? spring.delta_t : Vec3d{}, spring.slipping});
+}
+
+void append_wall_contact(State& s, const Scene& scene, const Drive& drive, const GrainRow& g, Index i, WallName wall,
+                         const Spring<double>& spring) {
+  const bool top = wall == WallName::top;
+  if (!(at_wall(g.x.z, g.r, top ? drive.wall_z : 0.0, top ? -1.0 : 1.0).delta_n < 0)) return;
+  s.wall_contacts.push_back({i, wall, scene.wall.k_t > 0 ? spring.delta_t : Vec3d{}, spring.slipping});
+}
+
+void finish_state(State& s, const Drive& d) {
+  std::sort(s.contacts.begin(), s.contacts.end(),
+            [](const Contact& a, const Contact& b) { return std::tie(a.i, a.j) < std::tie(b.i, b.j); });
+  std::sort(s.wall_contacts.begin(), s.wall_contacts.end(), [](const WallContact& a, const WallContact& b) {
+    return std::tie(a.wall, a.i) < std::tie(b.wall, b.i);
+  });
+  s.wall_z = d.wall_z, s.wall_v = d.wall_v, s.layer_u = d.layer_u;
+  s.wall_force = d.at.wall_force, s.shear_force = d.at.shear_force;
+  s.ledger = d.ledger;
+  s.step = d.step;
+  s.staggered = true;
+}
+
+void synchronise(const Scene& scene, State& s) {
+  if (!s.staggered) return;
+  for (Index i = 0; i < s.size(); ++i) {
+    const Mobility m = mobility(scene, s.r[i], s.role[i]);
+    s.v[i] = axpy(0.5 * scene.dt, m.acceleration(s.force[i]), s.v[i]);
+    s.omega[i] = axpy(0.5 * scene.dt, m.spin_acceleration(s.torque[i]), s.omega[i]);
+  }
+  Drive d = drive_of(scene, s);
+  d.half_step(scene, 1);
+  s.wall_v = d.wall_v, s.layer_u = d.layer_u;
+  s.staggered = false;
+}
+
+}  // namespace moraine::dem

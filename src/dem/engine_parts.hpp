@@ -1,0 +1,56 @@
+// What both engines share beside the physics: reading a State in, writing it out, checking it.
+#pragma once
+#include <vector>
+
+#include "dem/contact.hpp"
+#include "dem/drive.hpp"
+#include "dem/engine.hpp"
+#include "dem/leapfrog.hpp"
+#include "error.hpp"
+
+namespace moraine::dem {
+
+// Throws Error where the scene cannot be run: sides too short, no step, walls that contradict each other, ...
+void check_scene(const Scene& scene, const State& state);
+
+double neighbour_margin(const Scene& scene, const State& state);  // m
+
+// Rows of all grains, held ones with the velocity they are held at.
+std::vector<GrainRow> grain_rows(const Scene& scene, const State& state);
+
+Drive drive_of(const Scene& scene, const State& state);
+
+// A wall's action on a grain; n_x_f is the torque on it already.
+template <Features F>
+MORAINE_HD Action<double> wall_action(const ContactParameters& law, double dt, const Drive& drive, const GrainRow& grain,
+                                      const NowRow& now, WallName wall, Spring<double>& spring) {
+  const bool top = wall == WallName::top;
+  const Geometry<double> g = at_wall(grain.x.z, grain.r, top ? drive.wall_z : 0.0, top ? -1.0 : 1.0);
+  const Vec3d wall_v{0, 0, top ? drive.wall_v : 0.0}, still{0, 0, 0};
+  Action<double> a = contact_law<F>(law, dt, g, {grain.v - wall_v, grain.omega, still},
+                                    {now.v - wall_v, now.omega, still}, spring);
+  a.n_x_f = -g.l_i * a.n_x_f;
+  return a;
+}
+
+// A grain that is no longer finite, or outside what bounds it.
+MORAINE_HD bool is_lost(const Scene& scene, const Drive& drive, const GrainRow& g) {
+  const double sum = dot(g.x, g.x) + dot(g.v, g.v) + dot(g.omega, g.omega);
+  if (!(sum < 1e300)) return true;
+  if (scene.floor && g.x.z < -g.r) return true;
+  return scene.top_wall.drive != TopWall::Drive::none && g.x.z > drive.wall_z + g.r;
+}
+Error lost_grain(const Scene& scene, const Drive& drive, const GrainRow& g, Index id);
+
+void half_step_back(GrainRow& grain, const Mobility& mobility, const Vec3d& f, const Vec3d& torque, double dt);
+
+void append_grain(State& s, const GrainRow& grain, const Vec3d& rotation, const LoadRow& load, Role role);
+// Only if they touch.
+void append_contact(State& s, const Scene& scene, const Sides& sides, const GrainRow& a, const GrainRow& b, Index i,
+                    Index j, const Spring<double>& spring);
+void append_wall_contact(State& s, const Scene& scene, const Drive& drive, const GrainRow& grain, Index i, WallName wall,
+                         const Spring<double>& spring);
+// Sorts the contacts, copies the drive, marks the state staggered.
+void finish_state(State& s, const Drive& drive);
+
+}  // namespace moraine::dem

@@ -1,0 +1,40 @@
+// Which of the contact law's features a scene uses.
+#pragma once
+#include "dem/contact.hpp"
+
+namespace moraine::dem {
+
+inline Features features_of(const Scene& s) {
+  const auto any = [&](auto test) { return test(s.grain) || test(s.wall); };
+  Features f;
+  f.friction = any([](const ContactParameters& p) { return p.mu_s > 0 && (p.k_t > 0 || p.gamma_t > 0); });
+  f.viscous = any([](const ContactParameters& p) { return p.gamma_n > 0 || p.gamma_t > 0; });
+  f.softening = f.friction && any([](const ContactParameters& p) { return p.mu_d < p.mu_s; });
+  f.ledger = s.ledger;
+  return f;
+}
+
+// Calls use.operator()<F>() with the compiled set of features that equals f.
+template <class Use>
+void with_features(const Features& f, Use&& use) {
+  const auto ledger = [&]<bool friction, bool viscous, bool softening>() {
+    if (f.ledger)
+      use.template operator()<Features{friction, viscous, softening, true}>();
+    else
+      use.template operator()<Features{friction, viscous, softening, false}>();
+  };
+  const auto viscous = [&]<bool friction, bool softening>() {
+    if (f.viscous)
+      ledger.template operator()<friction, true, softening>();
+    else
+      ledger.template operator()<friction, false, softening>();
+  };
+  if (!f.friction)
+    viscous.template operator()<false, false>();
+  else if (f.softening)
+    viscous.template operator()<true, true>();
+  else
+    viscous.template operator()<true, false>();
+}
+
+}  // namespace moraine::dem

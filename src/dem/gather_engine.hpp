@@ -1,0 +1,416 @@
+// The GPU's engine: each grain walks its own contacts and adds up its own force, so no two threads write to one place. Each
+// contact is computed twice, by either grain, from the same numbers in the same order; its spring is kept twice, too.
+// Templated on Space: on the host it gives the same bits as PairEngine, which is how the tests prove this loop without a GPU.
+//
+// The host sends steps in batches and looks only now and then: once the neighbour lists are about to run out, a flag in
+// Control turns all later steps of the batch into nothing, and the host builds new ones.
+#pragma once
+#include <algorithm>
+#include <memory>
+
+#include "dem/engine_parts.hpp"
+#include "dem/features.hpp"
+#include "dem/neighbours.hpp"
+
+namespace moraine::dem {
+
+struct Control {
+  Drive drive;
+  double moved = 0;  // m, bound on the approach of any two bodies since the last search
+  bool stale = false, closed = true;
+};
+
+// Everything a step reads and writes, as plain pointers.
+struct GatherView {
+  Scene scene;
+  Sides sides;
+  Index n, chunk;
+  double margin;
+  GrainRow* grain;
+  NowRow* now;
+  LoadRow* load;
+  double* wall_push;  // N, each grain's force on the top wall
+  Vec3d* rotation;
+  const Mobility* mobility;
+  const Role* role;
+  const std::int64_t* row;
+  const Index* neighbour;
+  Spring<double>*spring, *wall_spring;
+  Reaction* reaction;        // one for each chunk, as the next two
+  Dissipation* dissipation;
+  double* fastest2;          // by component, m2/s2
+  Control* control;
+
+  MORAINE_HD Index chunks() const { return (n + chunk - 1) / chunk; }
+  MORAINE_HD Index chunk_end(Index c) const { return (c + 1) * chunk < n ? (c + 1) * chunk : n; }
+};
+
+namespace gather {
+
+struct SumChunk {
+  GatherView w;
+  MORAINE_HD void operator()(std::int64_t c) const {
+    if (w.control->stale) return;
+    Reaction reaction;
+    Dissipation dissipation;
+    for (Index i = static_cast<Index>(c) * w.chunk; i < w.chunk_end(static_cast<Index>(c)); ++i) {
+      reaction.wall_force += w.wall_push[i];
+      if (w.role[i] == Role::top) reaction.shear_force += w.load[i].f.x;
+      dissipation.slip += w.load[i].slip;
+      dissipation.viscous_power += w.load[i].viscous_power;
+    }
+    w.reaction[c] = reaction, w.dissipation[c] = dissipation;
+  }
+};
+
+struct AdvanceDrive {
+  GatherView w;
+  MORAINE_HD void operator()(std::int64_t) const {
+    Control& c = *w.control;
+    if (c.stale) return;
+    if (!c.closed) close(c.drive);
+    c.closed = false;
+    c.drive.advance(w.scene);
+  }
+  MORAINE_HD void close(Drive& drive) const {
+    Reaction reaction;
+    Dissipation dissipation;
+    for (Index k = 0; k < w.chunks(); ++k) {
+      reaction.wall_force += w.reaction[k].wall_force, reaction.shear_force += w.reaction[k].shear_force;
+      dissipation.slip += w.dissipation[k].slip, dissipation.viscous_power += w.dissipation[k].viscous_power;
+    }
+    drive.close(w.scene, reaction);
+    if (w.scene.ledger) drive.account(w.scene, dissipation);
+  }
+};
+
+template <Features F>
+struct Integrate {
+  GatherView w;
+  MORAINE_HD void operator()(std::int64_t i) const {
+    if (w.control->stale) return;
+    GrainRow& g = w.grain[i];
+    if (w.scene.shear.drive == Shear::Drive::stress && w.role[i] == Role::top) g.v.x = w.control->drive.layer_u;
+    const Triple dt(Vec3d{w.scene.dt, w.scene.dt, w.scene.dt});
+    const Triple acceleration = w.mobility[i].acceleration(w.load[i].f);
+    const Triple spin_acceleration = w.mobility[i].spin_acceleration(w.load[i].torque);
+    Kinematics<Triple> k{g.x, g.v, g.omega, w.rotation[i]};
+    leapfrog(k, acceleration, spin_acceleration, dt);
+    g.x = k.x, g.v = k.v, g.omega = k.omega, w.rotation[i] = k.rotation;
+    if constexpr (F.viscous)
+      w.now[i] = {axpy<double>(0.5 * w.scene.dt, acceleration, g.v), 0,
+                  axpy<double>(0.5 * w.scene.dt, spin_acceleration, g.omega), 0};
+  }
+};
+
+struct FastestInChunk {
+  GatherView w;
+  MORAINE_HD void operator()(std::int64_t c) const {
+    if (w.control->stale) return;
+    Vec3d fastest2{0, 0, 0};
+    for (Index i = static_cast<Index>(c) * w.chunk; i < w.chunk_end(static_cast<Index>(c)); ++i)
+      for (int a = 0; a < 3; ++a) fastest2[a] = max(w.grain[i].v[a] * w.grain[i].v[a], fastest2[a]);
+    for (int a = 0; a < 3; ++a) w.fastest2[3 * c + a] = fastest2[a];
+  }
+};
+
+struct NoteMovement {
+  GatherView w;
+  MORAINE_HD void operator()(std::int64_t) const {
+    Control& c = *w.control;
+    if (c.stale) return;
+    double v2[3] = {0, 0, 0};
+    for (Index k = 0; k < w.chunks(); ++k)
+      for (int a = 0; a < 3; ++a) v2[a] = max(w.fastest2[3 * k + a], v2[a]);
+    const double speed = max(sqrt(v2[0] + v2[1] + v2[2]), ::fabs(c.drive.wall_v));
+    c.moved += 2 * speed * w.scene.dt;
+    c.stale = !(c.moved < w.margin);
+  }
+};
+
+template <Features F>
+struct Forces {
+  GatherView w;
+  double dt;
+
+  MORAINE_HD void operator()(std::int64_t index) const {
+    if (w.control->stale) return;
+    const auto i = static_cast<Index>(index);
+    LoadRow sum{};
+    for (std::int64_t k = w.row[i]; k < w.row[i + 1]; ++k) {
+      const Index j = w.neighbour[k];
+      const bool first = i < j;
+      const GrainRow &a = w.grain[first ? i : j], &b = w.grain[first ? j : i];
+      const Geometry<double> g = between_grains(nearest_image(w.sides, a.x - b.x), a.r + b.r, a.r - b.r);
+      const Motion<double> before{a.v - b.v, a.omega, b.omega};
+      Motion<double> at = before;
+      if constexpr (F.viscous) {
+        const NowRow &p = w.now[first ? i : j], &q = w.now[first ? j : i];
+        at = {p.v - q.v, p.omega, q.omega};
+      }
+      const Action<double> action = contact_law<F>(w.scene.grain, dt, g, before, at, w.spring[k]);
+      if (first) {
+        sum.f += action.f;
+        sum.torque += -g.l_i * action.n_x_f;
+        sum.slip += action.slip;
+        sum.viscous_power += action.viscous_power;
+      } else {
+        sum.f -= action.f;
+        sum.torque += -g.l_j * action.n_x_f;
+      }
+    }
+    w.wall_push[i] = 0;
+    if (w.scene.floor) add_wall(i, WallName::floor, sum);
+    if (w.scene.top_wall.drive != TopWall::Drive::none) add_wall(i, WallName::top, sum);
+    w.load[i] = sum;
+  }
+
+  MORAINE_HD void add_wall(Index i, WallName wall, LoadRow& sum) const {
+    const NowRow now = F.viscous ? w.now[i] : NowRow{};
+    const Action<double> a = wall_action<F>(w.scene.wall, dt, w.control->drive, w.grain[i], now, wall,
+                                            w.wall_spring[2 * i + static_cast<int>(wall)]);
+    sum.f += a.f;
+    sum.slip += a.slip;
+    sum.torque += a.n_x_f;
+    sum.viscous_power += a.viscous_power;
+    if (wall == WallName::top) w.wall_push[i] = -a.f.z;
+  }
+};
+
+// Springs from the old rows of neighbours into the new ones.
+struct CarrySprings {
+  const std::int64_t *old_row, *row;
+  const Index *old_neighbour, *neighbour;
+  const Spring<double>* old_spring;
+  Spring<double>* spring;
+  MORAINE_HD void operator()(std::int64_t i) const {
+    for (std::int64_t k = row[i]; k < row[i + 1]; ++k) {
+      spring[k] = {{0, 0, 0}, 0};
+      for (std::int64_t q = old_row[i]; q < old_row[i + 1]; ++q)
+        if (old_neighbour[q] == neighbour[k]) spring[k] = old_spring[q];
+    }
+  }
+};
+
+struct FindLost {
+  GatherView w;
+  Index* lost;
+  MORAINE_HD void operator()(std::int64_t c) const {
+    lost[c] = -1;
+    for (Index i = static_cast<Index>(c) * w.chunk; i < w.chunk_end(static_cast<Index>(c)) && lost[c] < 0; ++i)
+      if (is_lost(w.scene, w.control->drive, w.grain[i])) lost[c] = i;
+  }
+};
+
+}  // namespace gather
+
+template <class Space>
+class GatherEngine final : public Engine {
+ public:
+  GatherEngine(Space space, std::string name) : space_(std::move(space)), name_(std::move(name)) {}
+
+  void load(const Scene& scene, const State& s) override {
+    check_scene(scene, s);
+    n_ = s.size();
+    id_ = s.id, x_start_ = s.x_start, role_host_ = s.role;
+    r_max_ = *std::max_element(s.r.begin(), s.r.end());
+    features_ = features_of(scene);
+    view_ = {};
+    view_.scene = scene, view_.sides = Sides::of(scene);
+    view_.n = n_, view_.chunk = chunk_size(n_), view_.margin = neighbour_margin(scene, s);
+    rebuilds_ = 0;
+
+    grain_.set(grain_rows(scene, s));
+    role_.set(s.role), rotation_.set(s.rotation);
+    std::vector<LoadRow> loads(n_);
+    std::vector<Mobility> mobilities(n_);
+    for (Index i = 0; i < n_; ++i) {
+      loads[i] = {s.force[i], 0, s.torque[i], 0};
+      mobilities[i] = mobility(scene, s.r[i], s.role[i]);
+    }
+    load_.set(loads), mobility_.set(mobilities);
+    now_.resize(features_.viscous ? n_ : 0), wall_push_.set(std::vector<double>(n_, 0));
+    std::vector<Spring<double>> wall_springs(2 * static_cast<std::size_t>(n_), {{0, 0, 0}, 0});
+    for (const WallContact& w : s.wall_contacts)
+      wall_springs[2 * static_cast<std::size_t>(w.i) + static_cast<int>(w.wall)] = {w.delta_t, w.slipping};
+    wall_spring_.set(wall_springs);
+    reaction_.resize(view_.chunks()), dissipation_.resize(view_.chunks()), fastest2_.resize(3 * view_.chunks());
+    lost_.resize(view_.chunks());
+    Control control;
+    control.drive = drive_of(scene, s);
+    control_.set({control});
+
+    search();
+    place_springs(s.contacts);
+    refresh_view();
+    if (s.staggered) return;
+
+    if (features_.viscous) {
+      std::vector<NowRow> now(n_);
+      const std::vector<GrainRow> grains = grain_.get();
+      for (Index i = 0; i < n_; ++i) now[i] = {grains[i].v, 0, grains[i].omega, 0};
+      now_.set(now);
+    }
+    forces(0);
+    start_half_a_step_back();
+  }
+
+  void advance(std::int64_t steps) override {
+    Control control = space_.read(control_.data());
+    const std::int64_t target = control.drive.step + steps;
+    while (control.drive.step < target) {
+      const std::int64_t batch = std::min<std::int64_t>(target - control.drive.step, 256);
+      for (std::int64_t k = 0; k < batch; ++k) one_step();
+      control = space_.read(control_.data());
+      check_lost(control);
+      if (control.stale) {
+        search_again();
+        control.stale = false, control.moved = 0;
+        space_.write(control_.data(), control);
+        forces(view_.scene.dt);
+      }
+    }
+  }
+
+  State state() const override {
+    State s;
+    s.id = id_, s.x_start = x_start_;
+    Control control = space_.read(control_.data());
+    const std::vector<GrainRow> grains = grain_.get();
+    const std::vector<LoadRow> loads = load_.get();
+    const std::vector<Vec3d> rotation = rotation_.get();
+    if (!control.closed) {
+      space_.for_each(view_.chunks(), gather::SumChunk{view_});
+      GatherView host = view_;
+      std::vector<Reaction> reaction = reaction_.get();
+      std::vector<Dissipation> dissipation = dissipation_.get();
+      host.reaction = reaction.data(), host.dissipation = dissipation.data();
+      gather::AdvanceDrive{host}.close(control.drive);
+    }
+    for (Index i = 0; i < n_; ++i) append_grain(s, grains[i], rotation[i], loads[i], role_host_[i]);
+
+    const std::vector<std::int64_t> row = lists_.row.get();
+    const std::vector<Index> neighbour = lists_.neighbour.get();
+    const std::vector<Spring<double>> spring = spring_.get(), wall_spring = wall_spring_.get();
+    for (Index i = 0; i < n_; ++i) {
+      for (std::int64_t k = row[i]; k < row[i + 1]; ++k)
+        if (const Index j = neighbour[k]; j > i)
+          append_contact(s, view_.scene, view_.sides, grains[i], grains[j], i, j, spring[k]);
+      for (const WallName wall : {WallName::floor, WallName::top})
+        if (wall == WallName::floor ? view_.scene.floor : view_.scene.top_wall.drive != TopWall::Drive::none)
+          append_wall_contact(s, view_.scene, control.drive, grains[i], i, wall,
+                              wall_spring[2 * static_cast<std::size_t>(i) + static_cast<int>(wall)]);
+    }
+    finish_state(s, control.drive);
+    return s;
+  }
+
+  Counts counts() const override { return {lists_.total / 2, lists_.total / 2, rebuilds_}; }
+  std::string describe() const override { return name_; }
+  int threads() const override { return 1; }
+
+ private:
+  void refresh_view() {
+    view_.grain = grain_.data(), view_.now = now_.data(), view_.load = load_.data();
+    view_.wall_push = wall_push_.data(), view_.rotation = rotation_.data(), view_.mobility = mobility_.data();
+    view_.role = role_.data(), view_.row = lists_.row.data(), view_.neighbour = lists_.neighbour.data();
+    view_.spring = spring_.data(), view_.wall_spring = wall_spring_.data(), view_.reaction = reaction_.data();
+    view_.dissipation = dissipation_.data(), view_.fastest2 = fastest2_.data(), view_.control = control_.data();
+  }
+
+  void search() {
+    lists_.build(space_, view_.scene, grain_.data(), role_.data(), n_, r_max_, view_.margin, /*half=*/false);
+    ++rebuilds_;
+  }
+
+  void search_again() {
+    std::swap(lists_, old_lists_);
+    std::swap(spring_, old_spring_);
+    search();
+    spring_.resize(std::max<std::int64_t>(lists_.total, 1));
+    space_.for_each(n_, gather::CarrySprings{old_lists_.row.data(), lists_.row.data(), old_lists_.neighbour.data(),
+                                             lists_.neighbour.data(), old_spring_.data(), spring_.data()});
+    refresh_view();
+  }
+
+  void place_springs(const std::vector<Contact>& contacts) {
+    const std::vector<std::int64_t> row = lists_.row.get();
+    const std::vector<Index> neighbour = lists_.neighbour.get();
+    std::vector<Spring<double>> springs(std::max<std::int64_t>(lists_.total, 1), {{0, 0, 0}, 0});
+    for (const Contact& c : contacts)
+      for (const auto& [i, j] : {std::pair{c.i, c.j}, std::pair{c.j, c.i}})
+        for (std::int64_t k = row[i]; k < row[i + 1]; ++k)
+          if (neighbour[k] == j) springs[k] = {c.delta_t, c.slipping};
+    spring_.set(springs);
+  }
+
+  void start_half_a_step_back() {
+    space_.for_each(view_.chunks(), gather::SumChunk{view_});
+    Control control = space_.read(control_.data());
+    Reaction reaction;
+    for (const Reaction& r : reaction_.get())
+      reaction.wall_force += r.wall_force, reaction.shear_force += r.shear_force;
+    control.drive.ledger = {};
+    control.drive.take(view_.scene, reaction);
+    std::vector<GrainRow> grains = grain_.get();
+    std::vector<LoadRow> loads = load_.get();
+    for (Index i = 0; i < n_; ++i) {
+      control.drive.ledger.viscous_power += loads[i].viscous_power;
+      half_step_back(grains[i], mobility(view_.scene, grains[i].r, role_host_[i]), loads[i].f, loads[i].torque,
+                     view_.scene.dt);
+      loads[i].slip = loads[i].viscous_power = 0;
+    }
+    control.drive.half_step(view_.scene, -1);
+    grain_.set(grains), load_.set(loads), control_.set({control});
+  }
+
+  void one_step() {
+    with_features(features_, [&]<Features F>() {
+      space_.for_each(view_.chunks(), gather::SumChunk{view_});
+      space_.for_each(1, gather::AdvanceDrive{view_});
+      space_.for_each(n_, gather::Integrate<F>{view_});
+      space_.for_each(view_.chunks(), gather::FastestInChunk{view_});
+      space_.for_each(1, gather::NoteMovement{view_});
+      space_.for_each(n_, gather::Forces<F>{view_, view_.scene.dt});
+    });
+  }
+
+  void forces(double dt) {
+    with_features(features_, [&]<Features F>() { space_.for_each(n_, gather::Forces<F>{view_, dt}); });
+  }
+
+  void check_lost(const Control& control) {
+    space_.for_each(view_.chunks(), gather::FindLost{view_, lost_.data()});
+    for (const Index i : lost_.get())
+      if (i >= 0) throw lost_grain(view_.scene, control.drive, space_.read(grain_.data() + i), id_[i]);
+  }
+
+  template <class T>
+  using Array = typename Space::template Array<T>;
+
+  Space space_;
+  std::string name_;
+  Index n_ = 0;
+  double r_max_ = 0;
+  Features features_;
+  GatherView view_;
+  Neighbours<Space> lists_, old_lists_;
+  Array<GrainRow> grain_;
+  Array<NowRow> now_;
+  Array<LoadRow> load_;
+  Array<double> wall_push_, fastest2_;
+  Array<Vec3d> rotation_;
+  Array<Mobility> mobility_;
+  Array<Role> role_;
+  Array<Spring<double>> spring_, old_spring_, wall_spring_;
+  Array<Reaction> reaction_;
+  Array<Dissipation> dissipation_;
+  Array<Control> control_;
+  Array<Index> lost_;
+  std::int64_t rebuilds_ = 0;
+  std::vector<Index> id_;
+  std::vector<Vec3d> x_start_;
+  std::vector<Role> role_host_;
+};
+
+}  // namespace moraine::dem

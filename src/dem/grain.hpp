@@ -1,0 +1,61 @@
+// Memory layout of what the contact loop reads and writes for each grain: three and two SIMD rows. Reading and writing
+// are kept apart so that threads never write into what others read.
+#pragma once
+#include <algorithm>
+
+#include "dem/scene.hpp"
+#include "dem/state.hpp"
+
+namespace moraine::dem {
+
+struct alignas(32) GrainRow {
+  Vec3d x;
+  double r;
+  Vec3d v;
+  double r_again;  // so that one row difference gives v_i - v_j and another row sum r_i + r_j
+  Vec3d omega;
+  double unused;
+};
+
+// Velocities at step n, needed by viscous contacts only.
+struct alignas(32) NowRow {
+  Vec3d v;
+  double unused_v;
+  Vec3d omega;
+  double unused_omega;
+};
+
+// Sums over a grain's contacts.
+struct alignas(32) LoadRow {
+  Vec3d f;
+  double slip;  // J, of the contacts in which the grain is i
+  Vec3d torque;
+  double viscous_power;  // W, likewise
+};
+
+// Grains are dealt into chunks of neighbours in memory order: the unit of work of a thread and of every sum. Their number
+// depends on the number of grains alone, so results do not depend on the number of threads.
+inline Index chunk_size(Index grains) {
+  const Index sixteenth = (grains / 16 + 63) / 64 * 64;
+  return std::clamp<Index>(sixteenth, 128, 1024);
+}
+inline Index chunk_count(Index grains) { return (grains + chunk_size(grains) - 1) / chunk_size(grains); }
+
+// Sides of the box for the minimum image: x - side * round(x * inverse); both zero along an open side.
+struct Sides {
+  Vec3d side, inverse;
+  static Sides of(const Scene& s) {
+    const auto along = [](bool periodic, double length) { return periodic ? length : 0.0; };
+    const Vec3d side{along(s.periodic_x, s.box.x), along(s.periodic_y, s.box.y), along(s.periodic_z, s.box.z)};
+    const auto inverse = [](double length) { return length > 0 ? 1 / length : 0.0; };
+    return {side, {inverse(side.x), inverse(side.y), inverse(side.z)}};
+  }
+};
+
+template <class T>
+MORAINE_HD Vec3<T> nearest_image(const Sides& s, const Vec3<T>& d) {
+  return {fma(T(-s.side.x), round(d.x * T(s.inverse.x)), d.x), fma(T(-s.side.y), round(d.y * T(s.inverse.y)), d.y),
+          fma(T(-s.side.z), round(d.z * T(s.inverse.z)), d.z)};
+}
+
+}  // namespace moraine::dem

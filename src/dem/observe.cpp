@@ -1,0 +1,149 @@
+#include "dem/observe.hpp"
+
+#include <algorithm>
+
+#include "dem/engine_parts.hpp"
+#include "dem/features.hpp"
+
+namespace moraine::dem {
+
+namespace {
+
+// The force of a contact as the law gives it, springs left as they are.
+constexpr Features all_features{true, true, true, false};
+
+GrainRow grain_at(const State& s, Index i, const std::vector<Vec3d>& v, const std::vector<Vec3d>& omega) {
+  return {s.x[i], s.r[i], v[i], s.r[i], omega[i], 0};
+}
+
+struct Velocities {
+  std::vector<Vec3d> v, omega;
+};
+Velocities at_step(const Scene& scene, const State& s) {
+  Velocities w{s.v, s.omega};
+  if (!s.staggered) return w;
+  for (Index i = 0; i < s.size(); ++i) {
+    const Mobility m = mobility(scene, s.r[i], s.role[i]);
+    w.v[i] = axpy(0.5 * scene.dt, m.acceleration(s.force[i]), s.v[i]);
+    w.omega[i] = axpy(0.5 * scene.dt, m.spin_acceleration(s.torque[i]), s.omega[i]);
+  }
+  return w;
+}
+
+struct WallForce {
+  Index i;
+  WallName wall;
+  double f_n;      // N
+  Vec3d f;         // N, on the grain
+  double delta_n;  // m
+};
+std::vector<WallForce> wall_forces(const Scene& scene, const State& s, const Velocities& at) {
+  std::vector<WallForce> out;
+  const Drive drive = drive_of(scene, s);
+  for (const WallContact& w : s.wall_contacts) {
+    const GrainRow g = grain_at(s, w.i, at.v, at.omega);
+    Spring<double> spring{w.delta_t, w.slipping};
+    const Action<double> a =
+        wall_action<all_features>(scene.wall, 0, drive, g, {g.v, 0, g.omega, 0}, w.wall, spring);
+    const bool top = w.wall == WallName::top;
+    out.push_back({w.i, w.wall, std::abs(a.f.z), a.f,
+                   at_wall(g.x.z, g.r, top ? drive.wall_z : 0.0, top ? -1.0 : 1.0).delta_n});
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<Vec3d> velocity(const Scene& scene, const State& s) { return at_step(scene, s).v; }
+
+std::vector<ContactForce> contact_forces(const Scene& scene, const State& s) {
+  const Sides sides = Sides::of(scene);
+  const Velocities at = at_step(scene, s);
+  std::vector<ContactForce> out;
+  out.reserve(s.contacts.size());
+  for (const Contact& c : s.contacts) {
+    const Vec3d x_ij = nearest_image(sides, s.x[c.i] - s.x[c.j]);
+    const Geometry<double> g = between_grains(x_ij, s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]);
+    const Motion<double> motion{at.v[c.i] - at.v[c.j], at.omega[c.i], at.omega[c.j]};
+    Spring<double> spring{c.delta_t, c.slipping};
+    const Action<double> a = contact_law<all_features>(scene.grain, 0, g, motion, motion, spring);
+    const Vec3d f_n = dot(a.f, g.n) * g.n;
+    out.push_back({c.i, c.j, s.x[c.i] - g.l_i * g.n, f_n, a.f - f_n, -g.delta_n});
+  }
+  return out;
+}
+
+std::vector<double> grain_pressure(const Scene& scene, const State& s) {
+  std::vector<double> sum(s.size(), 0);
+  for (const ContactForce& c : contact_forces(scene, s)) {
+    const double f = std::sqrt(dot(c.f_n, c.f_n));
+    sum[c.i] += f, sum[c.j] += f;
+  }
+  for (const WallForce& w : wall_forces(scene, s, at_step(scene, s))) sum[w.i] += w.f_n;
+  for (Index i = 0; i < s.size(); ++i) sum[i] /= 4 * std::numbers::pi * s.r[i] * s.r[i];
+  return sum;
+}
+
+Observation observe(const Scene& scene, const State& s) {
+  Observation o;
+  const double area = scene.area();
+  const bool has_wall = scene.top_wall.drive != TopWall::Drive::none;
+  const Velocities at = at_step(scene, s);
+  const std::vector<ContactForce> contacts = contact_forces(scene, s);
+  const std::vector<WallForce> walls = wall_forces(scene, s, at);
+
+  double floor_force = 0;
+  for (const WallForce& w : walls)
+    if (w.wall == WallName::floor) floor_force += w.f.z;
+  o.shear_stress = -s.shear_force / area;
+  o.normal_stress = (has_wall ? s.wall_force : floor_force) / area;
+
+  double volume = 0;
+  for (Index i = 0; i < s.size(); ++i) {
+    volume += sphere_volume(s.r[i]);
+    o.height = std::max(o.height, s.x[i].z + s.r[i]);
+  }
+  if (has_wall) o.height = s.wall_z;
+  o.porosity = 1 - volume / (area * (scene.periodic_z ? scene.box.z : o.height));
+
+  Energy& e = o.energy;
+  double normal_force = 0;
+  for (const ContactForce& c : contacts) {
+    o.mean_overlap += c.overlap;
+    o.max_overlap = std::max(o.max_overlap, c.overlap);
+    normal_force += std::sqrt(dot(c.f_n, c.f_n));
+    e.elastic_normal += 0.5 * scene.grain.k_n * c.overlap * c.overlap;
+  }
+  for (const Contact& c : s.contacts) e.elastic_tangential += 0.5 * scene.grain.k_t * dot(c.delta_t, c.delta_t);
+  for (const WallForce& w : walls) e.elastic_normal += 0.5 * scene.wall.k_n * w.delta_n * w.delta_n;
+  for (const WallContact& w : s.wall_contacts) e.elastic_tangential += 0.5 * scene.wall.k_t * dot(w.delta_t, w.delta_t);
+  if (!contacts.empty()) {
+    o.mean_overlap /= static_cast<double>(contacts.size());
+    o.coordination = 2.0 * static_cast<double>(contacts.size()) / s.size();
+    normal_force /= static_cast<double>(contacts.size());
+  }
+
+  double net = 0;
+  Index free = 0;
+  for (Index i = 0; i < s.size(); ++i) {
+    const Mobility mob = mobility(scene, s.r[i], s.role[i]);
+    const double m = sphere_mass(scene.density, s.r[i]), inertia = 0.4 * m * s.r[i] * s.r[i];
+    // 1/2 m v(n-1/2).v(n+1/2)
+    const auto before_times_after = [](const Vec3d& before, const Vec3d& at) { return dot(before, at + (at - before)); };
+    e.kinetic += 0.5 * m * before_times_after(s.v[i], at.v[i]);
+    e.rotational += 0.5 * inertia * before_times_after(s.omega[i], at.omega[i]);
+    if (s.role[i] != Role::free) continue;
+    e.potential += m * scene.gravity * s.x[i].z;
+    const Vec3d a = mob.acceleration(s.force[i]);
+    net += m * std::sqrt(dot(a, a));
+    ++free;
+  }
+  if (free > 0 && normal_force > 0) o.unbalanced_force = net / free / normal_force;
+  if (scene.top_wall.drive == TopWall::Drive::stress) {
+    const double half = s.staggered ? 0.5 * scene.dt * drive_of(scene, s).wall_acceleration(scene) : 0;
+    e.wall_kinetic = 0.5 * scene.top_wall.mass * s.wall_v * (s.wall_v + 2 * half);
+  }
+  return o;
+}
+
+}  // namespace moraine::dem

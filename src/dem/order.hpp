@@ -1,0 +1,12 @@
+// Memory order: grains that are close in space are close in memory.
+#pragma once
+#include "dem/scene.hpp"
+#include "dem/state.hpp"
+
+namespace moraine::dem {
+
+// Wraps positions into the box along periodic sides, sorts the grains along a space-filling curve, and takes contacts
+// along (their springs turn round where i and j change places). Ties go by id, so the result depends on the state alone.
+void sort_spatially(const Scene& scene, State& state);
+
+}  // namespace moraine::dem

@@ -1,0 +1,606 @@
+#include "dem/pair_engine.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+
+#include "dem/features.hpp"
+#include "dem/engine_parts.hpp"
+
+namespace moraine::dem {
+
+namespace {
+
+constexpr Index no_link = -1;
+constexpr int group_block = 32;          // groups of four that go through the three phases together
+constexpr int steps_between_checks = 256;
+constexpr int steps_near_list_should_last = 40;
+
+template <class Row>
+Pack row(const Row& v) {
+  return Pack::load(reinterpret_cast<const double*>(&v));
+}
+template <class Row>
+void set_row(Row& v, Pack p) {
+  p.store(reinterpret_cast<double*>(&v));
+}
+Pack without_last(Pack p) { return __builtin_shuffle(p.v, Pack(0.0).v, Pack::Bits{0, 1, 2, 7}); }
+
+}  // namespace
+
+void PairEngine::PairList::add(Index i, Index j, Index target, const Spring<double>& s) {
+  const auto lane = static_cast<int>(count % 4);
+  if (lane == 0) {
+    pairs.emplace_back();
+    springs.push_back({0.0, 0.0, 0.0, 0.0});
+  }
+  PairGroup& p = pairs.back();
+  p.i[lane] = i, p.j[lane] = j, p.target[lane] = target;
+  SpringGroup& g = springs.back();
+  g.x.v[lane] = s.delta_t.x, g.y.v[lane] = s.delta_t.y, g.z.v[lane] = s.delta_t.z, g.slipping.v[lane] = s.slipping;
+  ++count;
+}
+
+void PairEngine::PairList::pad(Index first_dummy) {
+  if (count % 4 == 0) return;
+  for (auto lane = static_cast<int>(count % 4); lane < 4; ++lane) {
+    pairs.back().i[lane] = first_dummy;
+    pairs.back().j[lane] = pairs.back().target[lane] = first_dummy + 1;
+  }
+}
+
+Spring<double> PairEngine::PairList::spring(std::int64_t k) const {
+  const SpringGroup& g = springs[k / 4];
+  const int lane = static_cast<int>(k % 4);
+  return {{g.x[lane], g.y[lane], g.z[lane]}, g.slipping[lane]};
+}
+
+PairEngine::PairEngine(int threads) { space_.threads = threads; }
+
+std::string PairEngine::describe() const {
+#if defined(__AVX2__)
+  const char* lanes = "AVX2";
+#elif defined(__x86_64__)
+  const char* lanes = "SSE2";
+#else
+  const char* lanes = "portable SIMD";
+#endif
+  return "cpu, " + std::to_string(space_.threads) + (space_.threads == 1 ? " thread, " : " threads, ") + lanes;
+}
+
+Engine::Counts PairEngine::counts() const {
+  Counts c = counts_;
+  c.candidates = neighbours_.total;
+  c.near = 0;
+  for (const Chunk& chunk : chunks_) c.near += chunk.near[0].count + chunk.near[1].count;
+  return c;
+}
+
+void PairEngine::load(const Scene& scene, const State& s) {
+  check_scene(scene, s);
+  scene_ = scene;
+  sides_ = Sides::of(scene);
+  n_ = s.size();
+  id_ = s.id;
+  x_start_ = s.x_start;
+  r_max_ = *std::max_element(s.r.begin(), s.r.end());
+  margin_ = neighbour_margin(scene, s);
+
+  chunk_size_ = chunk_size(n_);
+  const Index chunks = chunk_count(n_);
+  chunks_.clear();
+  chunks_.resize(chunks);
+  const std::int64_t rows = n_ + 2 * chunks;
+  grain_.resize(rows), load_.resize(rows), rotation_.resize(n_), mobility_.resize(n_), role_.resize(n_);
+  const Features features = features_of(scene);
+  now_.resize(features.viscous ? rows : 0);
+
+  const std::vector<GrainRow> grains = grain_rows(scene, s);
+  std::copy(grains.begin(), grains.end(), grain_.data());
+  for (Index i = 0; i < n_; ++i) {
+    role_.data()[i] = s.role[i];
+    mobility_.data()[i] = mobility(scene, s.r[i], s.role[i]);
+    rotation_.data()[i] = Pack(s.rotation[i].x, s.rotation[i].y, s.rotation[i].z, 0);
+    load_.data()[i] = {s.force[i], 0, s.torque[i], 0};
+  }
+  for (std::int64_t k = n_; k < rows; ++k) {  // dummies: pairs that never touch
+    const double apart = k % 2 == n_ % 2 ? 0 : 0.25 * (sides_.side.x > 0 ? sides_.side.x : 1.0);
+    grain_.data()[k] = {{apart, 0, 0}, -1e30, {0, 0, 0}, -1e30, {0, 0, 0}, 0};
+    load_.data()[k] = {};
+    if (features.viscous) now_.data()[k] = {};
+  }
+  for (Index c = 0; c < chunks; ++c) {
+    Chunk& chunk = chunks_[c];
+    chunk.begin = c * chunk_size_, chunk.end = std::min(n_, chunk.begin + chunk_size_);
+    for (Index i = chunk.begin; i < chunk.end; ++i)
+      if (s.role[i] == Role::top) chunk.top_layer.push_back(i);
+  }
+  for (const Contact& contact : s.contacts) {
+    Chunk& chunk = chunks_[contact.i / chunk_size_];
+    chunk.near[contact.j < chunk.end ? 0 : 1].add(contact.i, contact.j, contact.j, {contact.delta_t, contact.slipping});
+  }
+  for (const WallContact& w : s.wall_contacts)
+    chunks_[w.i / chunk_size_].walls.push_back({w.i, w.wall, {w.delta_t, w.slipping}});
+
+  course_ = {};
+  course_.drive = drive_of(scene, s);
+  closed_ = true;
+  counts_ = {};
+  run_ = nullptr;
+  with_features(features, [&]<Features F>() { select_features<F>(); });
+  find_candidates();
+
+  if (s.staggered) return;
+  if (features.viscous)
+    for (Index i = 0; i < n_; ++i) now_.data()[i] = {grain_.data()[i].v, 0, grain_.data()[i].omega, 0};
+  (this->*evaluate_)(0.0);
+  Drive& drive = course_.drive;
+  drive.ledger = {};
+  drive.take(scene, sum_reactions());
+  for (Index i = 0; i < n_; ++i) {
+    LoadRow& l = load_.data()[i];
+    drive.ledger.viscous_power += l.viscous_power;
+    half_step_back(grain_.data()[i], mobility_.data()[i], l.f, l.torque, scene.dt);
+    l.slip = l.viscous_power = 0;
+  }
+  drive.half_step(scene, -1);
+}
+
+template <Features F>
+void PairEngine::select_features() {
+  run_ = &PairEngine::run<F>;
+  evaluate_ = &PairEngine::evaluate<F>;
+}
+
+// Candidates, links between chunks and their slots, and with them new near lists.
+void PairEngine::find_candidates() {
+  neighbours_.build(space_, scene_, grain_.data(), role_.data(), n_, r_max_, margin_, /*half=*/true);
+  ++counts_.rebuilds;
+
+  std::vector<std::vector<Index>> link_to(chunks_.size());  // for one chunk at a time: chunk -> link
+  std::vector<Index> link_of(chunks_.size(), no_link);
+  links_.clear();
+  for (Chunk& chunk : chunks_) {
+    chunk.candidates[0].clear(), chunk.candidates[1].clear(), chunk.incoming.clear(), chunk.outgoing.clear();
+  }
+  for (Index c = 0; c < static_cast<Index>(chunks_.size()); ++c) {
+    Chunk& chunk = chunks_[c];
+    for (Index i = chunk.begin; i < chunk.end; ++i) {
+      for (std::int64_t k = neighbours_.row.data()[i]; k < neighbours_.row.data()[i + 1]; ++k) {
+        const Index j = neighbours_.neighbour.data()[k];
+        if (j < chunk.end) {
+          chunk.candidates[0].push_back({i, j, no_link});
+          continue;
+        }
+        const Index to = j / chunk_size_;
+        if (link_of[to] == no_link) {
+          link_of[to] = static_cast<Index>(links_.size());
+          links_.push_back({c, to, 0});
+          chunk.outgoing.push_back(link_of[to]);
+          chunks_[to].incoming.push_back(link_of[to]);
+        }
+        ++links_[link_of[to]].size;
+        chunk.candidates[1].push_back({i, j, link_of[to]});
+      }
+    }
+    for (const Index l : chunk.outgoing) link_of[links_[l].to] = no_link;
+  }
+  const Index rows = n_ + 2 * static_cast<Index>(chunks_.size());
+  std::int64_t slots = 0;
+  for (Link& link : links_) {
+    link.first = static_cast<Index>(rows + slots);
+    slots += link.size;
+  }
+  if (rows + slots > std::numeric_limits<Index>::max()) throw error("too many contacts for 32-bit indices: ", slots);
+  if (rows + slots > load_.size()) {  // keep the loads of grains and dummies
+    Host::Array<LoadRow> larger;
+    larger.resize(rows + slots);
+    std::copy(load_.data(), load_.data() + rows, larger.data());
+    load_ = std::move(larger);
+  }
+  std::fill(load_.data() + rows, load_.data() + rows + slots, LoadRow{});
+  slot_owner_.resize(slots);
+
+  course_.moved = course_.moved_near = 0;
+  course_.near_margin = choose_near_margin(fastest(course_.drive), 0);
+  run_team(space_.threads, [&](int t) {
+    for (std::size_t c = t; c < chunks_.size(); c += space_.threads)
+      rebuild_near(chunks_[c], course_.drive, course_.near_margin);
+  });
+}
+
+// Long enough to last for some dozens of steps, never beyond what the candidates cover.
+double PairEngine::choose_near_margin(double speed, double moved) const {
+  const double wanted = std::max(2 * speed * scene_.dt * steps_near_list_should_last, 1e-5 * r_max_);
+  return std::min(wanted, margin_ - moved);
+}
+
+// A bound on the speed of anything, m/s.
+double PairEngine::fastest(const Drive& drive) const {
+  double v2[3] = {0, 0, 0};
+  for (const Chunk& chunk : chunks_)
+    for (int a = 0; a < 3; ++a) v2[a] = std::max(v2[a], chunk.fastest2[a]);
+  return std::max(std::sqrt(v2[0] + v2[1] + v2[2]), std::abs(drive.wall_v));
+}
+
+Reaction PairEngine::sum_reactions() const {
+  Reaction sum;
+  for (const Chunk& chunk : chunks_) {
+    sum.wall_force += chunk.reaction.wall_force;
+    sum.shear_force += chunk.reaction.shear_force;
+  }
+  return sum;
+}
+
+Dissipation PairEngine::sum_dissipation() const {
+  Dissipation sum;
+  for (const Chunk& chunk : chunks_) {
+    sum.slip += chunk.dissipation.slip;
+    sum.viscous_power += chunk.dissipation.viscous_power;
+  }
+  return sum;
+}
+
+void PairEngine::rebuild_near(Chunk& chunk, const Drive& drive, double near_margin) {
+  const Index dummy = n_ + 2 * static_cast<Index>(&chunk - chunks_.data());
+  const GrainRow* const grain = grain_.data();
+  for (const Index l : chunk.outgoing) links_[l].used = 0;
+  for (int part = 0; part < 2; ++part) {
+    PairList& old = chunk.near[part];
+    PairList& list = chunk.spare;
+    list.clear();
+    std::int64_t k = 0;  // both lists are sorted by (i, j), so the springs are found by walking along
+    for (const Candidate& c : chunk.candidates[part]) {
+      const Vec3d d = nearest_image(sides_, grain[c.i].x - grain[c.j].x);
+      const double reach = grain[c.i].r + grain[c.j].r + near_margin;
+      if (dot(d, d) >= reach * reach) continue;
+      const auto earlier = [&](std::int64_t q) {
+        const PairGroup& g = old.pairs[q / 4];
+        return g.i[q % 4] != c.i ? g.i[q % 4] < c.i : g.j[q % 4] < c.j;
+      };
+      while (k < old.count && earlier(k)) ++k;
+      const bool known = k < old.count && old.pairs[k / 4].i[k % 4] == c.i && old.pairs[k / 4].j[k % 4] == c.j;
+      Index target = c.j;
+      if (part == 1) {
+        Link& link = links_[c.link];
+        target = link.first + link.used++;
+        slot_owner_.data()[target - n_ - 2 * static_cast<Index>(chunks_.size())] = c.j;
+      }
+      list.add(c.i, c.j, target, known ? old.spring(k) : Spring<double>{{0, 0, 0}, 0});
+    }
+    list.pad(dummy);
+    std::swap(old, list);
+  }
+
+  std::vector<WallPair> walls;
+  const auto add = [&](Index i, WallName wall) {
+    const auto same = [&](const WallPair& w) { return w.i == i && w.wall == wall; };
+    const auto known = std::find_if(chunk.walls.begin(), chunk.walls.end(), same);
+    walls.push_back(known != chunk.walls.end() ? *known : WallPair{i, wall, {{0, 0, 0}, 0}});
+  };
+  for (Index i = chunk.begin; i < chunk.end; ++i) {
+    if (scene_.floor && grain[i].x.z - grain[i].r < near_margin) add(i, WallName::floor);
+    if (scene_.top_wall.drive != TopWall::Drive::none && drive.wall_z - grain[i].x.z - grain[i].r < near_margin)
+      add(i, WallName::top);
+  }
+  chunk.walls = std::move(walls);
+}
+
+template <Features F>
+void PairEngine::pair_forces(Chunk& chunk, double dt) {
+  pair_forces<F>(chunk.near[0], dt);
+  pair_forces<F>(chunk.near[1], dt);
+}
+
+// Gather rows and turn them into lanes; the law; turn back and add up. Each phase runs over a block of groups, because one
+// group alone is a long chain of dependent operations.
+template <Features F>
+void PairEngine::pair_forces(PairList& list, double dt) {
+  const GrainRow* const grain = grain_.data();
+  [[maybe_unused]] const NowRow* const now = now_.data();
+  LoadRow* const load = load_.data();
+  const ContactParameters law = scene_.grain;
+  const Sides sides = sides_;
+  const Pack minus_but_last(-1, -1, -1, 1);
+
+  struct Lanes {
+    Pack x, y, z, r_difference, vx, vy, vz, r_sum, wix, wiy, wiz, wjx, wjy, wjz;
+  };
+  struct NowLanes {
+    Pack vx, vy, vz, wix, wiy, wiz, wjx, wjy, wjz;
+  };
+  struct Result {
+    Pack fx, fy, fz, slip, tix, tiy, tiz, power, tjx, tjy, tjz;
+  };
+  Lanes lanes[group_block];
+  Result results[group_block];
+  [[maybe_unused]] NowLanes now_lanes[F.viscous ? group_block : 1];
+
+  const auto groups = static_cast<std::int64_t>(list.pairs.size());
+  for (std::int64_t start = 0; start < groups; start += group_block) {
+    const int block = static_cast<int>(std::min<std::int64_t>(group_block, groups - start));
+
+    for (int g = 0; g < block; ++g) {
+      const PairGroup& p = list.pairs[start + g];
+      Lanes& q = lanes[g];
+      Pack d[4], v[4], wi[4], wj[4];
+      for (int k = 0; k < 4; ++k) {
+        const GrainRow &a = grain[p.i[k]], &b = grain[p.j[k]];
+        d[k] = row(a.x) - row(b.x);
+        v[k] = fma(minus_but_last, row(b.v), row(a.v));
+        if constexpr (F.friction) wi[k] = row(a.omega), wj[k] = row(b.omega);
+      }
+      transpose(d[0], d[1], d[2], d[3]);
+      transpose(v[0], v[1], v[2], v[3]);
+      q.x = d[0], q.y = d[1], q.z = d[2], q.r_difference = d[3];
+      q.vx = v[0], q.vy = v[1], q.vz = v[2], q.r_sum = v[3];
+      if constexpr (F.friction) {
+        transpose(wi[0], wi[1], wi[2], wi[3]);
+        transpose(wj[0], wj[1], wj[2], wj[3]);
+        q.wix = wi[0], q.wiy = wi[1], q.wiz = wi[2], q.wjx = wj[0], q.wjy = wj[1], q.wjz = wj[2];
+      }
+      if constexpr (F.viscous) {
+        NowLanes& m = now_lanes[g];
+        for (int k = 0; k < 4; ++k) {
+          const NowRow &a = now[p.i[k]], &b = now[p.j[k]];
+          v[k] = row(a.v) - row(b.v), wi[k] = row(a.omega), wj[k] = row(b.omega);
+        }
+        transpose(v[0], v[1], v[2], v[3]);
+        transpose(wi[0], wi[1], wi[2], wi[3]);
+        transpose(wj[0], wj[1], wj[2], wj[3]);
+        m = {v[0], v[1], v[2], wi[0], wi[1], wi[2], wj[0], wj[1], wj[2]};
+      }
+    }
+
+    for (int g = 0; g < block; ++g) {
+      const Lanes& q = lanes[g];
+      SpringGroup& s = list.springs[start + g];
+      const Vec3<Pack> x_ij = nearest_image(sides, Vec3<Pack>{q.x, q.y, q.z});
+      const Geometry<Pack> geometry = between_grains(x_ij, q.r_sum, q.r_difference);
+      const Motion<Pack> before{{q.vx, q.vy, q.vz}, {q.wix, q.wiy, q.wiz}, {q.wjx, q.wjy, q.wjz}};
+      Motion<Pack> at = before;
+      if constexpr (F.viscous) {
+        const NowLanes& m = now_lanes[g];
+        at = {{m.vx, m.vy, m.vz}, {m.wix, m.wiy, m.wiz}, {m.wjx, m.wjy, m.wjz}};
+      }
+      Spring<Pack> spring{{s.x, s.y, s.z}, F.softening ? s.slipping : Pack(0.0)};
+      const Action<Pack> a = contact_law<F>(law, dt, geometry, before, at, spring);
+      Result& out = results[g];
+      out.fx = a.f.x, out.fy = a.f.y, out.fz = a.f.z;
+      out.slip = F.ledger ? a.slip : Pack(0.0);
+      if constexpr (F.friction) {
+        s.x = spring.delta_t.x, s.y = spring.delta_t.y, s.z = spring.delta_t.z;
+        if constexpr (F.softening) s.slipping = spring.slipping;
+        const Vec3<Pack> ti = -geometry.l_i * a.n_x_f, tj = -geometry.l_j * a.n_x_f;
+        out.tix = ti.x, out.tiy = ti.y, out.tiz = ti.z, out.tjx = tj.x, out.tjy = tj.y, out.tjz = tj.z;
+      }
+      if constexpr (F.viscous && F.ledger) out.power = a.viscous_power;
+    }
+
+    for (int g = 0; g < block; ++g) {
+      const PairGroup& p = list.pairs[start + g];
+      const Result& out = results[g];
+      Pack f[4] = {out.fx, out.fy, out.fz, out.slip};
+      transpose(f[0], f[1], f[2], f[3]);
+      [[maybe_unused]] Pack ti[4], tj[4];
+      if constexpr (F.friction) {
+        ti[0] = out.tix, ti[1] = out.tiy, ti[2] = out.tiz, ti[3] = F.viscous && F.ledger ? out.power : Pack(0.0);
+        tj[0] = out.tjx, tj[1] = out.tjy, tj[2] = out.tjz, tj[3] = 0.0;
+        transpose(ti[0], ti[1], ti[2], ti[3]);
+        transpose(tj[0], tj[1], tj[2], tj[3]);
+      }
+      for (int k = 0; k < 4; ++k) {
+        LoadRow &a = load[p.i[k]], &b = load[p.target[k]];
+        set_row(a.f, row(a.f) + f[k]);
+        set_row(b.f, row(b.f) - without_last(f[k]));
+        if constexpr (F.friction) {
+          set_row(a.torque, row(a.torque) + ti[k]);
+          set_row(b.torque, row(b.torque) + tj[k]);
+        } else if constexpr (F.viscous && F.ledger) {
+          a.viscous_power += out.power[k];
+        }
+      }
+    }
+  }
+}
+
+// What the pairs of other chunks and the walls add, and the chunk's part of the totals.
+template <Features F>
+void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt) {
+  LoadRow* const load = load_.data();
+  const Index first_slot = n_ + 2 * static_cast<Index>(chunks_.size());
+  for (const Index l : chunk.incoming) {
+    const Link& link = links_[l];
+    for (Index slot = link.first; slot < link.first + link.used; ++slot) {
+      LoadRow& to = load[slot_owner_.data()[slot - first_slot]];
+      set_row(to.f, row(to.f) + row(load[slot].f));
+      set_row(to.torque, row(to.torque) + row(load[slot].torque));
+      load[slot] = {};
+    }
+  }
+
+  chunk.reaction = {};
+  for (WallPair& w : chunk.walls) {
+    const GrainRow& g = grain_.data()[w.i];
+    const NowRow now = F.viscous ? now_.data()[w.i] : NowRow{};
+    const Action<double> a = wall_action<F>(scene_.wall, dt, drive, g, now, w.wall, w.spring);
+    LoadRow& to = load[w.i];
+    to.f += a.f;
+    to.slip += a.slip;
+    to.torque += a.n_x_f;
+    to.viscous_power += a.viscous_power;
+    if (w.wall == WallName::top) chunk.reaction.wall_force -= a.f.z;
+  }
+  for (const Index i : chunk.top_layer) chunk.reaction.shear_force += load[i].f.x;
+}
+
+template <Features F>
+void PairEngine::integrate(Chunk& chunk, const Drive& drive) {
+  GrainRow* const grain = grain_.data();
+  if (scene_.shear.drive == Shear::Drive::stress)
+    for (const Index i : chunk.top_layer) grain[i].v.x = drive.layer_u;
+  const Pack zero(0.0), dt(scene_.dt, scene_.dt, scene_.dt, 0), half_dt = Pack(0.5) * dt;
+  Pack sum_f = zero, sum_t = zero, fastest2 = zero;
+  for (Index i = chunk.begin; i < chunk.end; ++i) {
+    const Pack m = row(mobility_.data()[i]);
+    const Pack inverse_mass = __builtin_shuffle(m.v, zero.v, Pack::Bits{0, 0, 1, 4});
+    const Pack gravity = __builtin_shuffle(m.v, zero.v, Pack::Bits{4, 4, 2, 4});
+    const Pack inverse_inertia = __builtin_shuffle(m.v, zero.v, Pack::Bits{3, 3, 3, 4});
+    LoadRow& load = load_.data()[i];
+    const Pack f = row(load.f), torque = row(load.torque);
+    const Pack acceleration = fma(f, inverse_mass, gravity), spin_acceleration = torque * inverse_inertia;
+    Kinematics<Pack> k{row(grain[i].x), row(grain[i].v), row(grain[i].omega), rotation_.data()[i]};
+    leapfrog(k, acceleration, spin_acceleration, dt);
+    set_row(grain[i].x, k.x), set_row(grain[i].v, k.v), set_row(grain[i].omega, k.omega);
+    rotation_.data()[i] = k.rotation;
+    if constexpr (F.viscous) {
+      set_row(now_.data()[i].v, fma(half_dt, acceleration, k.v));
+      set_row(now_.data()[i].omega, fma(half_dt, spin_acceleration, k.omega));
+    }
+    sum_f += f, sum_t += torque;
+    fastest2 = max(k.v * k.v, fastest2);
+    set_row(load.f, zero), set_row(load.torque, zero);
+  }
+  chunk.dissipation = {sum_f[3], sum_t[3]};
+  for (int a = 0; a < 3; ++a) chunk.fastest2[a] = fastest2[a];
+}
+
+void PairEngine::check(Chunk& chunk, const Drive& drive) const {
+  chunk.lost = -1;
+  for (Index i = chunk.begin; i < chunk.end && chunk.lost < 0; ++i)
+    if (is_lost(scene_, drive, grain_.data()[i])) chunk.lost = i;
+}
+
+void PairEngine::report_lost() const {
+  for (const Chunk& chunk : chunks_)
+    if (chunk.lost >= 0)
+      throw lost_grain(scene_, course_.drive, grain_.data()[chunk.lost], id_[chunk.lost]);
+  throw error("internal: no grain is lost");
+}
+
+template <Features F>
+void PairEngine::evaluate(double dt) {
+  for (Index i = 0; i < n_; ++i) load_.data()[i] = {};
+  for (Chunk& chunk : chunks_) pair_forces<F>(chunk, dt);
+  for (Chunk& chunk : chunks_) finish<F>(chunk, course_.drive, dt);
+}
+
+// Steps until all are done, or until new candidates are needed (then it is left between integration and forces, and
+// taken up there again with at_forces).
+template <Features F>
+PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
+  const double dt = scene_.dt;
+  const bool layer_by_stress = scene_.shear.drive == Shear::Drive::stress;
+  Barrier barrier(space_.threads);
+  Pause pause = Pause::done;
+  const std::int64_t wanted = steps;
+  const Course start = course_;
+  const bool start_at_forces = at_forces, start_closed = closed_;
+
+  run_team(space_.threads, [&](int thread) {
+    Course course = start;
+    Drive& drive = course.drive;
+    bool closed = start_closed, forces_next = start_at_forces;
+    std::int64_t left = wanted;
+    Pause reason = Pause::done;
+    const auto mine = [&](auto&& work) {
+      const auto share = [&](std::size_t t) { return t * chunks_.size() / space_.threads; };
+      for (std::size_t c = share(thread); c < share(thread + 1); ++c) work(chunks_[c]);
+    };
+
+    while (left > 0) {
+      if (!forces_next) {
+        if (layer_by_stress) {  // the layer's new velocity needs all forces on it first
+          barrier.wait();
+          if (!closed) drive.close(scene_, sum_reactions());
+          drive.advance(scene_);
+        }
+        mine([&](Chunk& c) { integrate<F>(c, drive); });
+        const bool guard = left == 1 || left % steps_between_checks == 0;
+        if (guard) mine([&](Chunk& c) { check(c, drive); });
+        barrier.wait();
+
+        if (!layer_by_stress) {
+          if (!closed) drive.close(scene_, sum_reactions());
+          drive.advance(scene_);
+        }
+        if (F.ledger && !closed) drive.account(scene_, sum_dissipation());
+        closed = false;
+        if (guard && std::any_of(chunks_.begin(), chunks_.end(), [](const Chunk& c) { return c.lost >= 0; })) {
+          reason = Pause::lost;
+          break;
+        }
+        const double speed = fastest(drive);
+        course.moved += 2 * speed * dt;
+        course.moved_near += 2 * speed * dt;
+        if (!(course.moved < margin_)) {
+          reason = Pause::search;
+          break;
+        }
+        if (!(course.moved_near < course.near_margin)) {
+          course.near_margin = choose_near_margin(speed, course.moved);
+          course.moved_near = 0;
+          mine([&](Chunk& c) { rebuild_near(c, drive, course.near_margin); });
+        }
+      }
+      forces_next = false;
+      mine([&](Chunk& c) { pair_forces<F>(c, dt); });
+      barrier.wait();
+      mine([&](Chunk& c) { finish<F>(c, drive, dt); });
+      --left;
+    }
+    if (thread == 0) course_ = course, closed_ = closed, steps = left, pause = reason;
+  });
+  at_forces = pause == Pause::search;
+  return pause;
+}
+
+void PairEngine::advance(std::int64_t steps) {
+  bool at_forces = false;
+  while (steps > 0) {
+    switch ((this->*run_)(steps, at_forces)) {
+      case Pause::done: break;
+      case Pause::search: find_candidates(); break;
+      case Pause::lost: report_lost();
+    }
+  }
+}
+
+State PairEngine::state() const {
+  State s;
+  s.id = id_;
+  s.x_start = x_start_;
+  Drive drive = course_.drive;
+  if (!closed_) {
+    drive.close(scene_, sum_reactions());
+    Dissipation sum;
+    for (const Chunk& chunk : chunks_) {
+      Dissipation part;
+      for (Index i = chunk.begin; i < chunk.end; ++i) {
+        part.slip += load_.data()[i].slip;
+        part.viscous_power += load_.data()[i].viscous_power;
+      }
+      sum.slip += part.slip, sum.viscous_power += part.viscous_power;
+    }
+    if (scene_.ledger) drive.account(scene_, sum);
+  }
+  for (Index i = 0; i < n_; ++i) {
+    const Pack& rotation = rotation_.data()[i];
+    append_grain(s, grain_.data()[i], {rotation[0], rotation[1], rotation[2]}, load_.data()[i], role_.data()[i]);
+  }
+  for (const Chunk& chunk : chunks_) {
+    for (const PairList& list : chunk.near)
+      for (std::int64_t k = 0; k < list.count; ++k) {
+        const Index i = list.pairs[k / 4].i[k % 4], j = list.pairs[k / 4].j[k % 4];
+        append_contact(s, scene_, sides_, grain_.data()[i], grain_.data()[j], i, j, list.spring(k));
+      }
+    for (const WallPair& w : chunk.walls)
+      append_wall_contact(s, scene_, drive, grain_.data()[w.i], w.i, w.wall, w.spring);
+  }
+  finish_state(s, drive);
+  return s;
+}
+
+std::unique_ptr<Engine> make_pair_engine(int threads) { return std::make_unique<PairEngine>(threads); }
+
+}  // namespace moraine::dem

@@ -1,0 +1,135 @@
+// The CPU's engine: each pair of near grains once, four at a time in SIMD lanes.
+//
+// Three lists, each drawn from the one before: candidates within the neighbour margin (cells, rebuilt every few thousand
+// steps), near pairs within a much smaller margin (every few dozen), and of these the overlapping ones carry force.
+// Pairs belong to the chunk of their lower grain. A pair across two chunks leaves j's share in a slot that j's chunk
+// collects, so that no two threads write to one place and every sum has one order (grain.hpp, SumOrder).
+#pragma once
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "backend/team.hpp"
+#include "dem/contact.hpp"
+#include "dem/drive.hpp"
+#include "dem/engine.hpp"
+#include "dem/leapfrog.hpp"
+#include "dem/neighbours.hpp"
+
+namespace moraine::dem {
+
+class PairEngine final : public Engine {
+ public:
+  explicit PairEngine(int threads);
+
+  void load(const Scene& scene, const State& state) override;
+  void advance(std::int64_t steps) override;
+  State state() const override;
+  Counts counts() const override;
+  std::string describe() const override;
+  int threads() const override { return space_.threads; }
+
+ private:
+  struct alignas(32) SpringGroup {
+    Pack x, y, z, slipping;
+  };
+  struct PairGroup {
+    std::array<Index, 4> i, j;
+    std::array<Index, 4> target;  // where j's share goes: j itself, or a slot
+  };
+  struct PairList {
+    std::vector<PairGroup> pairs;
+    std::vector<SpringGroup> springs;
+    std::int64_t count = 0;
+
+    void clear() { pairs.clear(), springs.clear(), count = 0; }
+    void add(Index i, Index j, Index target, const Spring<double>& spring);
+    void pad(Index first_dummy);  // fills the last group with a pair that never touches
+    Spring<double> spring(std::int64_t k) const;
+  };
+  struct Candidate {
+    Index i, j;
+    Index link;  // for pairs across chunks
+  };
+  struct WallPair {
+    Index i;
+    WallName wall;
+    Spring<double> spring;
+  };
+  // Slots for the pairs from one chunk to another.
+  struct Link {
+    Index from, to;
+    Index first, used = 0, size = 0;  // in slots
+  };
+  struct alignas(64) Chunk {
+    Index begin, end;
+    std::vector<Candidate> candidates[2];  // inside the chunk, across
+    PairList near[2], spare;
+    std::vector<WallPair> walls;
+    std::vector<Index> incoming;  // links, by the chunk they come from
+    std::vector<Index> outgoing;
+    std::vector<Index> top_layer;
+    Reaction reaction;
+    Dissipation dissipation;
+    double fastest2[3];           // largest v^2 by component
+    Index lost = -1;              // a grain that went wrong
+  };
+  // Each thread's own copy of what all agree on.
+  struct Course {
+    Drive drive;
+    double moved, moved_near, near_margin;
+    std::int64_t rebuilds_near = 0;
+  };
+  enum class Pause { done, search, lost };
+
+  void find_candidates();
+  void rebuild_near(Chunk& chunk, const Drive& drive, double near_margin);
+  double choose_near_margin(double speed, double moved) const;
+  double fastest(const Drive& drive) const;
+  Reaction sum_reactions() const;
+  Dissipation sum_dissipation() const;
+
+  template <Features F>
+  Pause run(std::int64_t& steps, bool& at_forces);
+  template <Features F>
+  void evaluate(double dt);
+  template <Features F>
+  void pair_forces(Chunk& chunk, double dt);
+  template <Features F>
+  void pair_forces(PairList& list, double dt);
+  template <Features F>
+  void finish(Chunk& chunk, const Drive& drive, double dt);
+  template <Features F>
+  void integrate(Chunk& chunk, const Drive& drive);
+  void check(Chunk& chunk, const Drive& drive) const;
+  [[noreturn]] void report_lost() const;
+
+  Pause (PairEngine::*run_)(std::int64_t&, bool&) = nullptr;
+  void (PairEngine::*evaluate_)(double) = nullptr;
+  template <Features F>
+  void select_features();
+
+  Host space_;
+  Scene scene_;
+  Sides sides_;
+  Index n_ = 0;
+  Index chunk_size_ = 0;
+  double r_max_ = 0, margin_ = 0;
+  std::vector<Chunk> chunks_;
+  std::vector<Link> links_;
+  Host::Array<Index> slot_owner_;
+  Host::Array<GrainRow> grain_;  // n grains, then two dummies for each chunk
+  Host::Array<NowRow> now_;      // viscous only
+  Host::Array<LoadRow> load_;    // n grains, dummies, slots
+  Host::Array<Pack> rotation_;
+  Host::Array<Mobility> mobility_;
+  Host::Array<Role> role_;
+  Neighbours<Host> neighbours_;
+  Course course_;
+  bool closed_ = true;  // the account of the present step is in drive.ledger already
+  Counts counts_;
+  std::vector<Index> id_;
+  std::vector<Vec3d> x_start_;
+};
+
+}  // namespace moraine::dem

@@ -1,0 +1,69 @@
+// The grains and all that must be known to go on from here with the same bits.
+//
+// Grains stand in "memory order" (spatially sorted, see order.hpp); `id` tells whose row it is. Within a stage the state is
+// staggered (leapfrog): positions, springs and forces belong to step n, velocities and spins to n - 1/2. Between stages
+// it is not: velocities and spins belong to n.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "dem/vec3.hpp"
+
+namespace moraine::dem {
+
+using Index = std::int32_t;
+
+enum class Role : std::uint8_t { free = 0, bottom = 1, top = 2 };  // sheared layers, par. 26
+
+struct Contact {
+  Index i, j;       // i < j, memory order
+  Vec3d delta_t;    // m, tangential spring of i against j
+  double slipping;  // 1 if it slipped in the last step, else 0; counts only where mu_d < mu_s
+};
+
+enum class WallName : std::int32_t { floor = 0, top = 1 };
+
+struct WallContact {
+  Index i;
+  WallName wall;
+  Vec3d delta_t;
+  double slipping;
+};
+
+// Energy that has passed since the stage began, J. See observe.hpp for the balance.
+struct Ledger {
+  double slip = 0;     // dissipated by sliding friction
+  double viscous = 0;  // dissipated by gamma_n, gamma_t
+  double top_wall = 0; // work done on the grains and the wall by the load
+  double layers = 0;   // work done on the grains by the driven layers
+  double viscous_power = 0;  // W, at the present step
+};
+
+struct State {
+  std::vector<Index> id;                   // 0 .. N-1, the row in every output file
+  std::vector<double> r;                   // m
+  std::vector<Vec3d> x;                    // m; not wrapped into the box while a stage runs
+  std::vector<Vec3d> v;                    // m/s
+  std::vector<Vec3d> omega;                // rad/s
+  std::vector<Vec3d> rotation;             // rad, integral of omega (par. 45)
+  std::vector<Vec3d> force;                // N, by contacts with grains and walls at step n; without gravity
+  std::vector<Vec3d> torque;               // N m
+  std::vector<Vec3d> x_start;              // m, where the displacement is counted from
+  std::vector<Role> role;
+  std::vector<Contact> contacts;           // overlapping pairs, sorted by (i, j)
+  std::vector<WallContact> wall_contacts;  // sorted by (wall, i)
+
+  double wall_z = 0;       // m, top wall
+  double wall_v = 0;       // m/s
+  double wall_force = 0;   // N, of the grains on the top wall, upwards
+  double shear_force = 0;  // N, sum of x forces of the grains on the top layer
+  double layer_u = 0;      // m/s, velocity of the top layer
+  Ledger ledger;
+
+  std::int64_t step = 0;   // steps since the stage began; t = step dt
+  bool staggered = false;
+
+  Index size() const { return static_cast<Index>(r.size()); }
+};
+
+}  // namespace moraine::dem

@@ -1,0 +1,41 @@
+// Vectors in three dimensions over any number type: double, or a pack of doubles (backend/pack.hpp).
+#pragma once
+#include "backend/number.hpp"
+
+namespace moraine::dem {
+
+template <class T>
+struct Vec3 {
+  T x, y, z;
+
+  MORAINE_HD T& operator[](int axis) { return axis == 0 ? x : axis == 1 ? y : z; }
+  MORAINE_HD const T& operator[](int axis) const { return axis == 0 ? x : axis == 1 ? y : z; }
+  MORAINE_HD Vec3& operator+=(const Vec3& b) { return *this = *this + b; }
+  MORAINE_HD Vec3& operator-=(const Vec3& b) { return *this = *this - b; }
+
+  friend MORAINE_HD Vec3 operator+(const Vec3& a, const Vec3& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+  friend MORAINE_HD Vec3 operator-(const Vec3& a, const Vec3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+  friend MORAINE_HD Vec3 operator*(const T& s, const Vec3& a) { return {s * a.x, s * a.y, s * a.z}; }
+  friend MORAINE_HD Vec3 operator-(const Vec3& a) { return {-a.x, -a.y, -a.z}; }
+  friend bool operator==(const Vec3&, const Vec3&) = default;
+};
+
+template <class T>
+MORAINE_HD T dot(const Vec3<T>& a, const Vec3<T>& b) {
+  return fma(a.x, b.x, fma(a.y, b.y, a.z * b.z));
+}
+
+template <class T>
+MORAINE_HD Vec3<T> cross(const Vec3<T>& a, const Vec3<T>& b) {
+  return {fma(a.y, b.z, -(a.z * b.y)), fma(a.z, b.x, -(a.x * b.z)), fma(a.x, b.y, -(a.y * b.x))};
+}
+
+// s a + b
+template <class T>
+MORAINE_HD Vec3<T> axpy(const T& s, const Vec3<T>& a, const Vec3<T>& b) {
+  return {fma(s, a.x, b.x), fma(s, a.y, b.y), fma(s, a.z, b.z)};
+}
+
+using Vec3d = Vec3<double>;
+
+}  // namespace moraine::dem

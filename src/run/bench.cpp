@@ -1,0 +1,36 @@
+#include <chrono>
+#include <cstdio>
+
+#include "error.hpp"
+#include "run/run.hpp"
+#include "run/stages.hpp"
+
+namespace moraine::run {
+
+void bench_case(const Options& options, const std::string& stage_name, std::int64_t steps) {
+  const cases::Case c = cases::load(options.directory, options.overrides);
+  std::size_t index = 0;
+  if (!stage_name.empty()) {
+    while (index < c.stages.size() && c.stages[index].name != stage_name) ++index;
+    if (index == c.stages.size()) throw error("--stage ", stage_name, ": the case has no such stage");
+  }
+  const Start start = start_of(c);
+  dem::State state = start.state;
+  const Stage stage = prepare(c, index, start, state);
+  const auto engine = dem::make_engine(options.backend, options.threads);
+  engine->load(stage.scene, state);
+  engine->advance(std::min<std::int64_t>(100, steps));  // warm caches and lists
+  const auto began = std::chrono::steady_clock::now();
+  engine->advance(steps);
+  const double ms = 1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count() / steps;
+  const auto counts = engine->counts();
+  const dem::State end = engine->state();
+  std::printf("{\"program\": \"moraine %s\", \"backend\": \"%s\", \"threads\": %d, \"stage\": \"%s\", \"steps\": %lld, "
+              "\"grains\": %d, \"contacts\": %zu, \"pairs\": %lld, \"near_pairs\": %lld, \"ms_per_step\": %.6g, "
+              "\"particle_steps_per_s\": %.6g}\n",
+              MORAINE_VERSION, engine->describe().c_str(), engine->threads(), stage.name.c_str(),
+              static_cast<long long>(steps), end.size(), end.contacts.size(), static_cast<long long>(counts.candidates),
+              static_cast<long long>(counts.near), ms, end.size() / ms * 1e3);
+}
+
+}  // namespace moraine::run

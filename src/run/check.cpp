@@ -1,0 +1,81 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+
+#include "run/progress.hpp"
+#include "run/run.hpp"
+#include "run/stages.hpp"
+
+namespace moraine::run {
+
+namespace {
+
+// ms a step, from a few steps of the stage itself.
+double time_a_step(dem::Engine& engine, const dem::Scene& scene, const dem::State& state) {
+  engine.load(scene, state);
+  engine.advance(20);
+  const auto began = std::chrono::steady_clock::now();
+  std::int64_t steps = 0;
+  double seconds = 0;
+  while (seconds < 0.5) {
+    engine.advance(20);
+    steps += 20;
+    seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  }
+  return 1e3 * seconds / static_cast<double>(steps);
+}
+
+}  // namespace
+
+void check_case(const Options& options) {
+  const cases::Case c = cases::load(options.directory, options.overrides);
+  const Start start = start_of(c);
+  const auto engine = dem::make_engine(options.backend, options.threads);
+  dem::State state = start.state;
+  const double n = state.size(), diameter = mean_diameter(state);
+  double volume = 0;
+  for (const double r : state.r) volume += dem::sphere_volume(r);
+  const double area = start.box_x * start.box_y;
+  const double settled = volume / 0.6 / area;  // m, at a porosity of 0.4
+
+  std::printf("%s\n", c.title.empty() ? c.directory.string().c_str() : c.title.c_str());
+  std::printf("  grains        %.0f, mean diameter %.4g m, box %.4g x %.4g m, bed about %.3g m (porosity 0.4)\n", n, diameter,
+              start.box_x, start.box_y, settled);
+  std::printf("  backend       %s\n", engine->describe().c_str());
+  // Records, rotation, mobility, some 3.5 candidates and near pairs a grain with springs, and the state kept for output.
+  std::printf("  memory        about %.0f MB\n", n * 2200 / 1e6 + 20);
+
+  double total = 0, ms = 0;
+  for (std::size_t k = 0; k < c.stages.size(); ++k) {
+    const cases::Stage& wanted = c.stages[k];
+    dem::State s = start.state;
+    Stage stage = prepare(c, k, start, s);
+    const dem::Scene& scene = stage.scene;
+    if (k == 0) ms = time_a_step(*engine, scene, s);
+    // Before the bed has settled its height is not known: from the volume of the grains.
+    const double height = c.start.empty() ? settled : stage.height_0;
+    double strain_rate = wanted.strain_rate != 0 ? wanted.strain_rate : scene.shear.velocity / height;
+    const double duration = wanted.duration > 0 ? wanted.duration : wanted.strain / std::abs(strain_rate);
+    const double steps = std::max(1.0, std::round(duration / scene.dt));
+    total += steps * ms / 1e3;
+    const double critical = step_by_eq_9(scene, s, 2.0);  // 2/omega_0, par. 23
+    std::printf("  stage %zu: %s\n", k + 1, wanted.name.c_str());
+    std::printf("    step        %.4g s, %.3g of the two-body limit 2/omega_0; %.0f steps for %.4g s\n", scene.dt,
+                scene.dt / critical, steps, duration);
+    if (wanted.normal_stress > 0) {
+      const double r = 0.5 * diameter;
+      std::printf("    stiffness   k_n/(sigma_0 d) = %.3g%s\n", c.k_n / (wanted.normal_stress * diameter),
+                  c.k_n / (wanted.normal_stress * diameter) < 1e4 ? "  (below 1e4: softer than rigid grains)" : "");
+      if (strain_rate != 0) {
+        const double inertia = std::abs(strain_rate) * r * std::sqrt(c.grains.density / wanted.normal_stress);
+        std::printf("    inertia     I = %.3g (eq. 1)%s\n", inertia, inertia > 1e-3 ? "  (above 1e-3: not pseudo-static)" : "");
+      }
+    }
+    std::printf("    time        about %s at %.3g ms a step\n", readable_time(steps * ms / 1e3).c_str(), ms);
+  }
+  std::printf("  all           about %s, timed on the first stage's grains\n", readable_time(total).c_str());
+}
+
+}  // namespace moraine::run

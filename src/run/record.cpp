@@ -1,0 +1,102 @@
+#include "run/record.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+namespace moraine::run {
+
+namespace {
+
+double layer_displacement(const dem::State& s) {
+  for (dem::Index i = 0; i < s.size(); ++i)
+    if (s.role[i] == dem::Role::top) return s.x[i].x - s.x_start[i].x;
+  return 0;
+}
+
+bool shears(cases::Stage::Kind k) { return k == cases::Stage::Kind::shear || k == cases::Stage::Kind::shear_stress; }
+
+}  // namespace
+
+output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, double time_0, double energy_0) {
+  const dem::Observation o = dem::observe(stage.scene, s);
+  const dem::Energy& e = o.energy;
+  const dem::Ledger& l = s.ledger;
+  output::Row row{};
+  row.stage = static_cast<double>(index);
+  row.step = static_cast<double>(s.step);
+  row.stage_time = row.step * stage.scene.dt;
+  row.time = time_0 + row.stage_time;
+  row.shear_strain = shears(stage.kind) ? layer_displacement(s) / stage.height_0 : 0;
+  row.shear_stress = o.shear_stress;
+  row.normal_stress = o.normal_stress;
+  row.shear_friction = o.normal_stress > 0 ? o.shear_stress / o.normal_stress : 0;
+  row.height = o.height;
+  row.dilation = o.height - stage.height_0;
+  row.dilation_diameters = row.dilation / stage.diameter;
+  row.porosity = o.porosity;
+  row.mean_overlap = o.mean_overlap, row.max_overlap = o.max_overlap;
+  row.coordination = o.coordination;
+  row.unbalanced_force = o.unbalanced_force;
+  row.kinetic = e.kinetic, row.rotational = e.rotational;
+  row.elastic_normal = e.elastic_normal, row.elastic_tangential = e.elastic_tangential;
+  row.potential = e.potential, row.wall_kinetic = e.wall_kinetic;
+  row.slip = l.slip, row.viscous = l.viscous, row.top_wall_work = l.top_wall, row.layers_work = l.layers;
+  row.residue = stage.scene.ledger ? (e.total() - energy_0) + l.slip + l.viscous - l.top_wall - l.layers
+                                   : std::numeric_limits<double>::quiet_NaN();
+  return row;
+}
+
+Strength strength_of(const std::vector<output::Row>& rows) {
+  Strength s{0, 0, 0, 0, rows.back().dilation_diameters};
+  for (const output::Row& r : rows)
+    if (r.shear_friction > s.peak) s.peak = r.shear_friction, s.peak_strain = r.shear_strain;
+  const double last = rows.back().shear_strain;
+  std::size_t count = 0;
+  for (const output::Row& r : rows) {
+    if (r.shear_strain >= 2.0 / 3.0 * last) s.ultimate += r.shear_friction, ++count;
+    double sum = 0;
+    int n = 0;
+    for (const output::Row& q : rows)
+      if (std::abs(q.shear_strain - r.shear_strain) <= 0.01) sum += q.shear_friction, ++n;
+    if (r.shear_strain >= 0.01 || last < 0.02) s.smoothed_peak = std::max(s.smoothed_peak, sum / n);
+  }
+  s.ultimate /= static_cast<double>(count);
+  return s;
+}
+
+double energy_put_in(const std::vector<output::Row>& rows) {
+  const output::Row& last = rows.back();
+  return std::max(0.0, last.top_wall_work) + std::max(0.0, last.layers_work) +
+         std::max(0.0, rows.front().potential - last.potential);
+}
+
+std::string summary(const std::vector<cases::Stage>& stages, const std::vector<output::Row>& rows) {
+  std::string out =
+      "stage         end time  height  porosity  contacts/  friction  friction  friction  dilation  ledger    residue/\n"
+      "              s         m       1         grain      peak      (smooth)  ultimate  diameters residue J energy in\n";
+  for (std::size_t k = 0; k < stages.size(); ++k) {
+    std::vector<output::Row> own;
+    for (const output::Row& r : rows)
+      if (r.stage == static_cast<double>(k)) own.push_back(r);
+    if (own.empty()) continue;
+    const output::Row& last = own.back();
+    char text[256], friction[64];
+    const Strength s = strength_of(own);
+    if (shears(stages[k].kind))
+      std::snprintf(friction, sizeof friction, "%-10.3f%-10.3f%-10.3f", s.peak, s.smoothed_peak, s.ultimate);
+    else
+      std::snprintf(friction, sizeof friction, "%-30s", "-");
+    const double in = energy_put_in(own);
+    std::snprintf(text, sizeof text, "%-14s%-10.4g%-8.4f%-10.4f%-11.3f%s%-+10.3f%-10.1e%.1e\n", stages[k].name.c_str(),
+                  last.time, last.height, last.porosity, last.coordination, friction, s.dilation_diameters,
+                  last.residue, in > 0 ? std::abs(last.residue) / in : 0.0);
+    out += text;
+  }
+  return out +
+         "peak: largest value; smooth: largest mean over a shear strain of 0.02; ultimate: mean over the last third of the strain\n"
+         "energy in: work of wall and driven layer, and what the grains fell\n";
+}
+
+}  // namespace moraine::run

@@ -1,0 +1,28 @@
+// From a state to a row of the series, and from the series to the table at the end.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "output/files.hpp"
+#include "run/stages.hpp"
+
+namespace moraine::run {
+
+// energy_0: the total when the stage began, J; time_0: s, when the stage began.
+output::Row row_of(std::size_t index, const Stage& stage, const dem::State& state, double time_0, double energy_0);
+
+// How the friction curve of a shear stage is read.
+//   peak: the largest value; smoothed_peak: of the mean over a window of shear strain 0.02
+//   ultimate: the mean over the last third of the strain
+struct Strength {
+  double peak, peak_strain, smoothed_peak, ultimate;
+  double dilation_diameters;  // at the end
+};
+Strength strength_of(const std::vector<output::Row>& stage_rows);
+
+// J: work of wall and layers, and what the grains fell.
+double energy_put_in(const std::vector<output::Row>& stage_rows);
+
+std::string summary(const std::vector<cases::Stage>& stages, const std::vector<output::Row>& rows);
+
+}  // namespace moraine::run

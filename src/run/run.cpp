@@ -1,0 +1,199 @@
+#include "run/run.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <iostream>
+
+#include "error.hpp"
+#include "output/files.hpp"
+#include "run/progress.hpp"
+#include "run/record.hpp"
+#include "run/stages.hpp"
+
+namespace moraine::run {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+volatile std::sig_atomic_t stop_requested = 0;
+
+struct Files {
+  fs::path output;
+  fs::path checkpoint() const { return output / "checkpoint.h5"; }
+  fs::path series() const { return output / "series.h5"; }
+  fs::path snapshots() const { return output / "snapshots"; }
+  fs::path log() const { return output / "log.txt"; }
+  fs::path resolved() const { return output / "case.toml"; }
+  std::vector<fs::path> all() const { return {checkpoint(), series(), snapshots(), log(), resolved()}; }
+};
+
+void make_directories(const fs::path& path) {
+  std::error_code failed;
+  fs::create_directories(path, failed);
+  if (failed) throw error(path.string(), ": cannot be created: ", failed.message());
+}
+
+class Runner {
+ public:
+  explicit Runner(const Options& options)
+      : options_(options), case_(cases::load(options.directory, options.overrides)), files_{case_.directory / "output"} {}
+
+  void run() {
+    const bool resuming = settle_old_output();
+    if (resuming && now_.finished) {
+      std::cerr << files_.checkpoint().string() << ": the case has finished already\n";
+      std::cout << summary(case_.stages, now_.rows);
+      return;
+    }
+    engine_ = dem::make_engine(options_.backend, options_.threads);
+    make_directories(files_.snapshots());
+    progress_ = std::make_unique<Progress>(files_.log(), resuming, options_.quiet);
+    try {
+      run_stages(resuming);
+    } catch (const Error& e) {
+      const bool kept = fs::exists(files_.checkpoint());
+      const std::string after = kept ? "; the last good checkpoint stays in " + files_.checkpoint().string() : "";
+      progress_->say(std::string("stopped: ") + e.what() + after);
+      throw error(e.what(), after);
+    }
+  }
+
+ private:
+  // Resumes, refuses or clears what an earlier run has left. True if the run goes on from a checkpoint.
+  bool settle_old_output() {
+    const bool found = fs::exists(files_.checkpoint()) || fs::exists(files_.series());
+    if (options_.force) {
+      for (const fs::path& p : files_.all()) fs::remove_all(p);
+      return false;
+    }
+    if (!found) return false;
+    if (!options_.resume)
+      throw error(files_.output.string(), ": holds the results of an earlier run; use --resume to go on from its checkpoint, or "
+                  "--force to replace it");
+    if (!fs::exists(files_.checkpoint())) return false;  // cut off before its first checkpoint
+    now_ = output::read_checkpoint(files_.checkpoint());
+    if (now_.case_text != case_.resolved)
+      throw error(files_.checkpoint().string(), ": belongs to another version of this case (see ", files_.resolved().string(),
+                  "); undo the change, or use --force to run anew");
+    return true;
+  }
+
+  void run_stages(bool resuming) {
+    start_ = start_of(case_);
+    if (!resuming) {
+      now_.case_text = case_.resolved;
+      now_.state = start_.state;
+    }
+    now_.version = MORAINE_VERSION;
+    const std::string header = "# moraine " MORAINE_VERSION ", " + engine_->describe() + ", seed " +
+                               std::to_string(case_.grains.seed) + "\n";
+    output::write_text(files_.resolved(), header + case_.resolved);
+    progress_->say((resuming ? "resumed: " : "") + case_.title + ": " + std::to_string(start_.state.size()) + " grains, " +
+                   engine_->describe());
+    series_ = std::make_unique<output::Series>(files_.series(), now_.rows);
+
+    for (auto k = static_cast<std::size_t>(now_.stage); k < case_.stages.size(); ++k) run_stage(k, resuming), resuming = false;
+    now_.finished = true;
+    save();
+    series_.reset();
+    progress_->say("finished: " + files_.output.string());
+    const std::string table = summary(case_.stages, now_.rows);
+    progress_->log(table);
+    std::cout << table;
+  }
+
+  void run_stage(std::size_t index, bool resuming) {
+    now_.stage = static_cast<std::int64_t>(index);
+    Stage stage;
+    if (resuming) {
+      stage = describe(case_, index, now_.scene, now_.height_0, now_.state);
+      engine_->load(stage.scene, now_.state);
+    } else {
+      if (!now_.rows.empty()) now_.stage_start_time = now_.rows.back().time;
+      dem::synchronise(now_.scene, now_.state);
+      stage = prepare(case_, index, start_, now_.state);
+      engine_->load(stage.scene, now_.state);
+      now_.state = engine_->state();
+      now_.scene = stage.scene, now_.height_0 = stage.height_0;
+      now_.energy_0 = dem::observe(stage.scene, now_.state).energy.total();
+      record(stage);
+      snapshot(stage);
+      if (index == 0) save();
+    }
+    char text[200];
+    std::snprintf(text, sizeof text, "stage %s: %lld steps of %.3g s", stage.name.c_str(), static_cast<long long>(stage.steps),
+                  stage.scene.dt);
+    progress_->say(text);
+    std::int64_t step = now_.state.step;
+    progress_->begin(stage.name, step, stage.steps, 0);
+
+    std::int64_t slice = 64;  // steps between looks at the clock
+    while (step < stage.steps) {
+      const auto next = [&](std::int64_t every) { return (step / every + 1) * every; };
+      const std::int64_t event = std::min<std::int64_t>({next(stage.series_every), next(stage.snapshot_every), stage.steps});
+      const std::int64_t until = std::min(event, step + slice);
+      const auto began = std::chrono::steady_clock::now();
+      engine_->advance(until - step);
+      const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+      if (took < 0.1 && until == step + slice) slice *= 2;
+      step = until;
+      if (step == event) {
+        now_.state = engine_->state();
+        if (step % stage.series_every == 0 || step == stage.steps) record(stage);
+        if (step % stage.snapshot_every == 0 || step == stage.steps) snapshot(stage);
+      }
+      progress_->show({step, static_cast<double>(step) * stage.scene.dt, now_.rows.back().unbalanced_force});
+      const bool stop = stop_requested;
+      if (stop || step == stage.steps || seconds_since_save() > case_.output.checkpoint_interval) {
+        if (step != event) now_.state = engine_->state();
+        save();
+      }
+      if (stop) throw error("interrupted at step ", step, " of stage ", stage.name, "; --resume goes on from here");
+    }
+  }
+
+  void record(const Stage& stage) {
+    now_.rows.push_back(row_of(static_cast<std::size_t>(now_.stage), stage, now_.state, now_.stage_start_time, now_.energy_0));
+    series_->append(now_.rows.back());
+  }
+
+  void snapshot(const Stage& stage) {
+    char name[80];
+    std::snprintf(name, sizeof name, "%02d-%s-%06lld", static_cast<int>(now_.stage) + 1, stage.name.c_str(),
+                  static_cast<long long>((now_.state.step + stage.snapshot_every - 1) / stage.snapshot_every));
+    now_.snapshots.push_back(
+        output::write_snapshot(files_.snapshots(), name, now_.rows.back().time, stage.scene, now_.state));
+    output::write_xdmf(files_.snapshots(), now_.snapshots);
+  }
+
+  void save() {
+    output::write_checkpoint(files_.checkpoint(), now_);
+    saved_ = std::chrono::steady_clock::now();
+  }
+  double seconds_since_save() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - saved_).count();
+  }
+
+  Options options_;
+  cases::Case case_;
+  Files files_;
+  Start start_;
+  output::Checkpoint now_;
+  std::unique_ptr<dem::Engine> engine_;
+  std::unique_ptr<Progress> progress_;
+  std::unique_ptr<output::Series> series_;
+  std::chrono::steady_clock::time_point saved_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
+void run_case(const Options& options) {
+  std::signal(SIGINT, [](int) { stop_requested = 1; });
+  std::signal(SIGTERM, [](int) { stop_requested = 1; });
+  Runner(options).run();
+}
+
+}  // namespace moraine::run

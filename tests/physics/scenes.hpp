@@ -1,0 +1,148 @@
+// Scenes and comparisons that several tests share.
+#pragma once
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "dem/engine.hpp"
+#include "dem/observe.hpp"
+#include "dem/order.hpp"
+#include "dem/packing.hpp"
+#include "dem/scene.hpp"
+#include "dem/state.hpp"
+
+namespace moraine::dem {
+
+inline double length(const Vec3d& a) { return std::sqrt(dot(a, a)); }
+inline double mass(const Scene& s, double r) { return sphere_mass(s.density, r); }
+inline double inertia(const Scene& s, double r) { return 0.4 * mass(s, r) * r * r; }
+
+// Grains alone: no gravity, no walls, no periodic sides.
+inline Scene empty_space(double k) {
+  Scene s;
+  s.box = {1, 1, 1};
+  s.periodic_x = s.periodic_y = s.floor = false;
+  s.gravity = 0;
+  s.grain.k_n = s.grain.k_t = s.wall.k_n = s.wall.k_t = k;
+  return s;
+}
+
+// The staggered state after so many steps.
+inline State run(Engine& engine, const Scene& scene, const State& start, std::int64_t steps) {
+  engine.load(scene, start);
+  engine.advance(steps);
+  return engine.state();
+}
+
+// Slope of log(error) over log(dt), between neighbours in the two series.
+inline std::vector<double> orders(const std::vector<double>& dt, const std::vector<double>& error) {
+  std::vector<double> slope;
+  for (std::size_t k = 1; k < dt.size(); ++k)
+    slope.push_back(std::log(error[k] / error[k - 1]) / std::log(dt[k] / dt[k - 1]));
+  return slope;
+}
+
+// Three hundred soft grains of mixed size that came to rest under their weight; x and y are periodic.
+struct Bed {
+  Scene scene;
+  State state;
+};
+inline const Bed& settled_bed() {
+  static const Bed bed = [] {
+    Packing p;
+    p.count = 300, p.columns_x = p.columns_y = 5;
+    p.radius_mean = 0.01, p.radius_std = 0.0005, p.cell = 1.06, p.seed = 3;
+    const Lattice lattice = make_lattice(p);
+    Scene s;
+    s.box = {lattice.box_x, lattice.box_y, 1};
+    s.grain = s.wall = {1e5, 1e5, 10, 10, 0.5, 0.5};
+    s.dt = 0.1 * std::sqrt(mass(s, 0.008) / s.grain.k_n);
+    State state = lattice.state;
+    sort_spatially(s, state);
+    const auto engine = make_engine(Backend::cpu, 1);
+    Bed out{s, run(*engine, s, state, 100000)};
+    synchronise(out.scene, out.state);
+    out.state.step = 0, out.state.ledger = {};
+    return out;
+  }();
+  return bed;
+}
+
+// The settled bed sheared by its top layer under a loaded wall, with everything the contact law can do.
+inline Bed sheared_bed() {
+  Bed bed = settled_bed();
+  Scene& s = bed.scene;
+  State& state = bed.state;
+  double top = 0;
+  for (Index i = 0; i < state.size(); ++i) top = std::max(top, state.x[i].z + state.r[i]);
+  for (Index i = 0; i < state.size(); ++i)
+    state.role[i] = state.x[i].z < 0.02 ? Role::bottom : state.x[i].z > top - 0.03 ? Role::top : Role::free;
+  state.wall_z = top;
+  s.grain.gamma_n = s.grain.gamma_t = 0;
+  s.top_wall = {TopWall::Drive::stress, 0.5, 500, 0, 0, 0, 0};
+  s.shear = {Shear::Drive::velocity, 0.2, 0, false};
+  return bed;
+}
+
+// Grains flying about in a box with three periodic sides, some of them in contact.
+inline Bed cloud(Index count, double side, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  const auto uniform = [&](double low, double high) {
+    return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1p-53);
+  };
+  std::vector<double> r(count);
+  std::vector<Vec3d> x(count);
+  for (Index i = 0; i < count; ++i) {
+    r[i] = uniform(0.006, 0.012);
+    for (bool free = false; !free;) {  // at most slightly overlapping
+      x[i] = {uniform(0, side), uniform(0, side), uniform(0, side)};
+      free = true;
+      for (Index j = 0; j < i && free; ++j) {
+        Vec3d d = x[i] - x[j];
+        for (int a = 0; a < 3; ++a) d[a] -= side * std::rint(d[a] / side);
+        free = length(d) > 0.98 * (r[i] + r[j]);
+      }
+    }
+  }
+  Bed c{{}, grains_at_rest(r, x)};
+  c.scene.box = {side, side, side};
+  c.scene.periodic_z = true, c.scene.floor = false, c.scene.gravity = 0;
+  c.scene.grain = c.scene.wall = {1e5, 1e5, 0, 0, 0.5, 0.5};
+  c.scene.dt = 0.1 * std::sqrt(mass(c.scene, 0.006) / 1e5);
+  for (Index i = 0; i < count; ++i) {
+    c.state.v[i] = {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
+    c.state.omega[i] = {uniform(-50, 50), uniform(-50, 50), uniform(-50, 50)};
+  }
+  sort_spatially(c.scene, c.state);
+  return c;
+}
+
+// Every number of the two states, bit by bit.
+inline void expect_same_bits(const State& a, const State& b) {
+  const auto same = [](const auto& p, const auto& q, const char* name) {
+    ASSERT_EQ(p.size(), q.size()) << name;
+    using T = std::decay_t<decltype(p[0])>;
+    for (std::size_t k = 0; k < p.size(); ++k)
+      ASSERT_EQ(std::memcmp(&p[k], &q[k], sizeof(T)), 0) << name << "[" << k << "] differs";
+  };
+  same(a.id, b.id, "id"), same(a.r, b.r, "r"), same(a.role, b.role, "role");
+  same(a.x, b.x, "x"), same(a.v, b.v, "v"), same(a.omega, b.omega, "omega");
+  same(a.rotation, b.rotation, "rotation"), same(a.force, b.force, "force"), same(a.torque, b.torque, "torque");
+  same(a.x_start, b.x_start, "x_start");
+  same(a.contacts, b.contacts, "contacts"), same(a.wall_contacts, b.wall_contacts, "wall_contacts");
+  const auto numbers = [](const State& s) {
+    const Ledger& l = s.ledger;
+    return std::vector<double>{s.wall_z, s.wall_v,  s.wall_force, s.shear_force, s.layer_u,
+                               l.slip,   l.viscous, l.top_wall,   l.layers,      l.viscous_power};
+  };
+  same(numbers(a), numbers(b), "wall, layer, ledger");
+  EXPECT_EQ(a.step, b.step);
+  EXPECT_EQ(a.staggered, b.staggered);
+}
+
+}  // namespace moraine::dem

@@ -1,0 +1,123 @@
+// Two grains, known answers.
+#include "backends.hpp"
+#include "dem/contact.hpp"
+#include "physics/scenes.hpp"
+
+namespace moraine::dem {
+namespace {
+
+constexpr double k = 1e5, r1 = 0.01, v0 = 0.1;
+
+struct Collision {
+  double time, overlap, v1, v2;  // s, m, m/s along the line of flight
+};
+
+// Grain 1 flies at v0 at grain 2, which rests. They begin half a step apart, so that contact begins between two steps.
+Collision collide(Engine& engine, const Scene& s, double r2) {
+  const Vec3d n{1.0 / 3, 2.0 / 3, 2.0 / 3};
+  const double gap = 0.5 * v0 * s.dt;
+  State start = grains_at_rest({r1, r2}, {Vec3d{0, 0, 0}, (r1 + r2 + gap) * n});
+  start.v[0] = v0 * n;
+  engine.load(s, start);
+  Collision c{};
+  double distance = 0;
+  std::int64_t steps = 0;
+  for (bool closed = true; closed; ++steps) {
+    engine.advance(1);
+    const State now = engine.state();
+    distance = length(now.x[1] - now.x[0]);
+    c.overlap = std::max(c.overlap, r1 + r2 - distance);
+    c.v1 = dot(now.v[0], n), c.v2 = dot(now.v[1], n);
+    closed = steps == 0 || distance < r1 + r2;
+  }
+  // Flight before and after is uniform.
+  c.time = static_cast<double>(steps) * s.dt - gap / v0 - (distance - r1 - r2) / (c.v2 - c.v1);
+  return c;
+}
+
+double reduced_mass(const Scene& s, double r2) { return 1 / (1 / mass(s, r1) + 1 / mass(s, r2)); }
+
+class TwoGrains : public OnEveryBackend {};
+
+TEST_P(TwoGrains, HeadOnElastic) {
+  const auto engine = make();
+  for (const double r2 : {r1, 1.7 * r1}) {
+    Scene s = empty_space(k);
+    const double m1 = mass(s, r1), m2 = mass(s, r2), inverse_omega = std::sqrt(reduced_mass(s, r2) / k);
+    s.dt = 1e-3 * inverse_omega;
+    const double second_order = 1e-6;  // (omega dt)^2
+    const Collision c = collide(*engine, s, r2);
+    EXPECT_NEAR(c.time / (std::numbers::pi * inverse_omega), 1, second_order);
+    EXPECT_NEAR(c.overlap / (v0 * inverse_omega), 1, second_order);
+    EXPECT_NEAR(c.v1 / v0, (m1 - m2) / (m1 + m2), second_order);
+    EXPECT_NEAR(c.v2 / v0, 2 * m1 / (m1 + m2), second_order);
+  }
+}
+
+// m* xi'' + gamma xi' + k xi = 0 from xi = 0, xi' = v0, until the force k xi + gamma xi' is zero and would begin to pull
+// (Schwager and Poeschel 2007). With beta = gamma/2m*, w^2 = w0^2 - beta^2 that is at t_c = atan2(2 beta w, beta^2 - w^2)/w,
+// or ln((beta + W)/(beta - W))/W with W^2 = beta^2 - w0^2 where it is overdamped; then xi' = -v0 exp(-beta t_c).
+double restitution(double beta, double w0) {
+  const double w = std::sqrt(std::abs(w0 * w0 - beta * beta));
+  const double t_c = beta < w0 ? std::atan2(2 * beta * w, beta * beta - w * w) / w : std::log((beta + w) / (beta - w)) / w;
+  return std::exp(-beta * t_c);
+}
+
+TEST_P(TwoGrains, HeadOnDamped) {
+  const auto engine = make();
+  for (const double r2 : {r1, 1.7 * r1})
+    for (const double damping : {0.05, 0.3, 0.8, 1.5}) {  // beta/omega_0
+      Scene s = empty_space(k);
+      const double m = reduced_mass(s, r2), w0 = std::sqrt(k / m);
+      s.grain.gamma_n = 2 * damping * w0 * m;
+      s.dt = 1e-3 / w0;
+      const Collision c = collide(*engine, s, r2);
+      // second order: the largest rate is w0 or 2 beta
+      const double rate = std::max(1.0, 2 * damping) * 1e-3;
+      EXPECT_NEAR((c.v2 - c.v1) / v0, restitution(damping * w0, w0), rate * rate) << "beta/omega_0 = " << damping;
+    }
+}
+
+ON_EVERY_BACKEND(TwoGrains);
+
+// A pair with a strained tangential spring, carried round once as one rigid body. Force and torque must turn with it.
+// The step is small because the contact's velocity is itself of second order in the angle: a pair that turns by a
+// radian in steps of theta gathers theta^2/6 of its size.
+TEST(RotatedPair, ForcesTurnWithIt) {
+  const double r_i = 0.012, r_j = 0.008, distance = 0.98 * (r_i + r_j), spring = 0.01 * distance;
+  const ContactParameters law{k, k, 0, 0, 1, 1};
+  const double theta = 5e-7, dt = 1e-6;
+  const auto steps = static_cast<std::int64_t>(2 * std::numbers::pi / theta);
+  const Vec3d n{1.0 / 3, 2.0 / 3, 2.0 / 3}, t{2.0 / 3, 1.0 / 3, -2.0 / 3};
+  const Vec3d oblique = (1 / length(n + 2.0 * t + cross(n, t))) * (n + 2.0 * t + cross(n, t));
+
+  for (const Vec3d& axis : {t, cross(n, t), n, oblique}) {
+    const auto turned = [&](const Vec3d& a, double angle) {
+      return std::cos(angle) * a + std::sin(angle) * cross(axis, a) + ((1 - std::cos(angle)) * dot(axis, a)) * axis;
+    };
+    for (const double strained : {0.0, spring}) {
+      const Vec3d first = strained / std::sqrt(2.0) * (t + cross(n, t));
+      Spring<double> s{first, 0};
+      const Vec3d omega = (theta / dt) * axis;
+      Action<double> a{};
+      for (std::int64_t step = 1; step <= steps; ++step) {
+        const double angle = static_cast<double>(step) * theta;
+        const auto g = between_grains(distance * turned(n, angle), r_i + r_j, r_i - r_j);
+        // (x(n) - x(n-1))/dt, without the cancellation
+        const Vec3d v = (2 * std::sin(0.5 * theta) / dt * distance) * cross(axis, turned(n, angle - 0.5 * theta));
+        a = contact_law<Features{true, false, false, true}>(law, dt, g, {v, omega, omega}, {v, omega, omega}, s);
+        ASSERT_EQ(a.slip, 0);
+      }
+      const double end = static_cast<double>(steps) * theta, scale = k * spring;
+      const Vec3d n_end = turned(n, end), f_t = a.f - dot(a.f, n_end) * n_end, expected = turned(-k * first, end);
+      EXPECT_NEAR(length(f_t), k * strained, 1e-10 * scale);
+      EXPECT_LT(length(f_t - expected), 1e-10 * scale);
+      EXPECT_LT(length(a.n_x_f - cross(n_end, expected)), 1e-10 * scale);
+      // What the forces do to the pair, the torques undo.
+      EXPECT_LT(length(cross(distance * n_end, a.f) - distance * a.n_x_f), 1e-14 * distance * length(a.f));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace moraine::dem
