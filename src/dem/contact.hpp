@@ -68,10 +68,35 @@ MORAINE_HD Geometry<double> at_wall(double z, double r, double wall_z, double fa
   return {{0, 0, facing}, delta_n, r + 0.5 * delta_n, 0, 0};
 }
 
-// dt = 0 evaluates the forces and leaves the spring as it is.
+// How far a contact has slid over a step, and where that puts its spring if it does not slip.
+template <class T>
+struct Trial {
+  Vec3<T> step;     // m, tangential displacement in the step
+  Vec3<T> delta_t;  // m, the old spring turned, plus that
+};
+
+template <class T>
+MORAINE_HD Trial<T> stretch(double dt, const Geometry<T>& g, const Motion<T>& before, const Vec3<T>& old) {
+  // The contact's displacement over the step, seen from the middle of it.
+  const T half_turn = T(0.5 * dt) * g.curvature;
+  const Vec3<T> n_mid = axpy(-half_turn, axpy(-dot(before.v, g.n), g.n, before.v), g.n);
+  const Vec3<T> spin = axpy(g.l_i, before.omega_i, g.l_j * before.omega_j);
+  const Vec3<T> v_c = before.v + cross(n_mid, spin);
+  const Vec3<T> step = T(dt) * axpy(-dot(v_c, n_mid), n_mid, v_c);
+
+  // The old spring turns with the pair: about n by the mean spin of both, then from the old tangent plane into the new
+  // one. Both keep its length to fourth order in the angle, so a contact that is carried round for long loses nothing.
+  const T twist = T(0.5 * dt) * dot(g.n, before.omega_i + before.omega_j);
+  const Vec3<T> twisted =
+      axpy(twist, cross(g.n, axpy(T(0.5), step, old)), axpy(T(-0.5) * twist * twist, old, old));
+  const Vec3<T> sum = twisted + step;
+  return {step, axpy(-dot(g.n, sum), n_mid, sum)};
+}
+
+// Normal force, and the tangential one cut to Coulomb's limit; the spring is left at what it carries.
 template <Features F, class T>
-MORAINE_HD Action<T> contact_law(const ContactParameters& p, double dt, const Geometry<T>& g, const Motion<T>& before,
-                                 const Motion<T>& now, Spring<T>& spring) {
+MORAINE_HD Action<T> respond(const ContactParameters& p, const Geometry<T>& g, const Motion<T>& now, const Trial<T>& trial,
+                             Spring<T>& spring) {
   const T zero(0);
   const auto touching = g.delta_n < zero;
   const T f_elastic = T(-p.k_n) * g.delta_n;
@@ -86,24 +111,7 @@ MORAINE_HD Action<T> contact_law(const ContactParameters& p, double dt, const Ge
   if constexpr (F.viscous && F.ledger) a.viscous_power = select(touching, (f_elastic - f_n) * v_n_now, zero);
   if constexpr (!F.friction) return a;
 
-  // The contact's displacement over the step, seen from the middle of it.
-  const T half_turn = T(0.5 * dt) * g.curvature;
-  const Vec3<T> n_mid = axpy(-half_turn, axpy(-dot(before.v, g.n), g.n, before.v), g.n);
-  const Vec3<T> spin = axpy(g.l_i, before.omega_i, g.l_j * before.omega_j);
-  const Vec3<T> v_c = before.v + cross(n_mid, spin);
-  const Vec3<T> step = T(dt) * axpy(-dot(v_c, n_mid), n_mid, v_c);
-
-  // The old spring turns with the pair: about n by the mean spin of both, then from the old tangent plane into the new
-  // one. Both keep its length to fourth order in the angle, so a contact that is carried round for long loses nothing.
-  const Vec3<T> old = spring.delta_t;
-  const T twist = T(0.5 * dt) * dot(g.n, before.omega_i + before.omega_j);
-  const Vec3<T> twisted =
-      axpy(twist, cross(g.n, axpy(T(0.5), step, old)), axpy(T(-0.5) * twist * twist, old, old));
-  const Vec3<T> sum = twisted + step;
-  const Vec3<T> trial = axpy(-dot(g.n, sum), n_mid, sum);
-
-  // Coulomb's limit. A spring beyond it is shortened to what the dynamic limit carries.
-  Vec3<T> f_t = T(-p.k_t) * trial;
+  Vec3<T> f_t = T(-p.k_t) * trial.delta_t;
   Vec3<T> v_t_now{zero, zero, zero};
   if constexpr (F.viscous) {
     const Vec3<T> c = now.v + cross(g.n, axpy(g.l_i, now.omega_i, g.l_j * now.omega_j));
@@ -118,11 +126,11 @@ MORAINE_HD Action<T> contact_law(const ContactParameters& p, double dt, const Ge
   const T cut = select(slips, T(p.mu_d) * f_n / sqrt(size2), T(1));
   f_t = cut * f_t;
 
-  Vec3<T> kept = cut * trial;
+  Vec3<T> kept = cut * trial.delta_t;
   if constexpr (F.viscous) {  // here f_t is not the spring's alone
-    const T carried = T(p.k_t) * sqrt(dot(trial, trial));
+    const T carried = T(p.k_t) * sqrt(dot(trial.delta_t, trial.delta_t));
     const T dynamic = T(p.mu_d) * f_n;
-    kept = select(slips & (carried > dynamic), dynamic / carried, T(1)) * trial;
+    kept = select(slips & (carried > dynamic), dynamic / carried, T(1)) * trial.delta_t;
     kept = {select(touching, kept.x, zero), select(touching, kept.y, zero), select(touching, kept.z, zero)};
   }
   spring.delta_t = kept;
@@ -132,10 +140,19 @@ MORAINE_HD Action<T> contact_law(const ContactParameters& p, double dt, const Ge
   a.n_x_f = cross(g.n, f_t);
   if constexpr (F.ledger) {
     // Mean force times plastic displacement; a contact that opens gives up what its spring still held.
-    a.slip = T(0.5 * p.k_t) * dot((trial - step) + kept, trial - kept);
+    a.slip = T(0.5 * p.k_t) * dot((trial.delta_t - trial.step) + kept, trial.delta_t - kept);
     if constexpr (F.viscous) a.viscous_power = a.viscous_power - dot(axpy(T(p.k_t), kept, f_t), v_t_now);
   }
   return a;
+}
+
+// The whole law. dt = 0 evaluates the forces and leaves the spring as it is.
+template <Features F, class T>
+MORAINE_HD Action<T> contact_law(const ContactParameters& p, double dt, const Geometry<T>& g, const Motion<T>& before,
+                                 const Motion<T>& now, Spring<T>& spring) {
+  Trial<T> trial{};
+  if constexpr (F.friction) trial = stretch(dt, g, before, spring.delta_t);
+  return respond<F>(p, g, now, trial, spring);
 }
 
 }  // namespace moraine::dem

@@ -27,8 +27,7 @@ bool cuda_device_present() {
 }
 
 std::unique_ptr<Engine> make_engine(Backend backend, int threads) {
-  if (threads <= 0) threads = available_cores();
-  if (backend == Backend::reference) return make_reference_engine(threads);
+  if (backend == Backend::reference) return make_reference_engine(threads > 0 ? threads : available_cores());
   if (backend == Backend::automatic) backend = cuda_device_present() ? Backend::cuda : Backend::cpu;
   if (backend == Backend::cpu) return make_pair_engine(threads);
   if (!cuda_built())

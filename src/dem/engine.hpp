@@ -36,7 +36,7 @@ class Engine {
 
 enum class Backend { automatic, cpu, cuda, reference };  // reference: the GPU's loop on the host
 
-// threads = 0: one for each core that this process may use. Throws Error where the backend is not built in or has no device.
+// threads = 0: one for each core that this process may use, but fewer for a small bed. Throws Error where the backend is not built in or has no device.
 std::unique_ptr<Engine> make_engine(Backend backend, int threads = 0);
 
 bool cuda_built();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <tuple>
 
 #include "dem/features.hpp"
 #include "dem/engine_parts.hpp"
@@ -55,7 +56,7 @@ Spring<double> PairEngine::PairList::spring(std::int64_t k) const {
   return {{g.x[lane], g.y[lane], g.z[lane]}, g.slipping[lane]};
 }
 
-PairEngine::PairEngine(int threads) { space_.threads = threads; }
+PairEngine::PairEngine(int threads) : threads_wanted_(threads) { space_.threads = std::max(1, threads); }
 
 std::string PairEngine::describe() const {
 #if defined(__AVX2__)
@@ -85,6 +86,9 @@ void PairEngine::load(const Scene& scene, const State& s) {
   x_start_ = s.x_start;
   r_max_ = *std::max_element(s.r.begin(), s.r.end());
   margin_ = neighbour_margin(scene, s);
+
+  // Below some 1,500 grains a thread waits longer at barriers than it works.
+  space_.threads = threads_wanted_ > 0 ? threads_wanted_ : std::clamp(n_ / 1500, 1, available_cores());
 
   chunk_size_ = chunk_size(n_);
   const Index chunks = chunk_count(n_);
@@ -292,8 +296,8 @@ void PairEngine::pair_forces(Chunk& chunk, double dt) {
   pair_forces<F>(chunk.near[1], dt);
 }
 
-// Gather rows and turn them into lanes; the law; turn back and add up. Each phase runs over a block of groups, because one
-// group alone is a long chain of dependent operations.
+// Short phases over a block of groups: gather rows and turn them into lanes, the three parts of the law, turn back and
+// add up. One group alone is a long chain of dependent operations; in phases the processor works on several at once.
 template <Features F>
 void PairEngine::pair_forces(PairList& list, double dt) {
   const GrainRow* const grain = grain_.data();
@@ -304,17 +308,15 @@ void PairEngine::pair_forces(PairList& list, double dt) {
   const Pack minus_but_last(-1, -1, -1, 1);
 
   struct Lanes {
-    Pack x, y, z, r_difference, vx, vy, vz, r_sum, wix, wiy, wiz, wjx, wjy, wjz;
-  };
-  struct NowLanes {
-    Pack vx, vy, vz, wix, wiy, wiz, wjx, wjy, wjz;
-  };
-  struct Result {
-    Pack fx, fy, fz, slip, tix, tiy, tiz, power, tjx, tjy, tjz;
+    Vec3<Pack> x_ij;
+    Pack r_sum, r_difference;
+    Motion<Pack> before;
+    [[no_unique_address]] std::conditional_t<F.viscous, Motion<Pack>, std::tuple<>> now;
   };
   Lanes lanes[group_block];
-  Result results[group_block];
-  [[maybe_unused]] NowLanes now_lanes[F.viscous ? group_block : 1];
+  Geometry<Pack> geometry[group_block];
+  Trial<Pack> trials[group_block];
+  Action<Pack> actions[group_block];
 
   const auto groups = static_cast<std::int64_t>(list.pairs.size());
   for (std::int64_t start = 0; start < groups; start += group_block) {
@@ -332,15 +334,14 @@ void PairEngine::pair_forces(PairList& list, double dt) {
       }
       transpose(d[0], d[1], d[2], d[3]);
       transpose(v[0], v[1], v[2], v[3]);
-      q.x = d[0], q.y = d[1], q.z = d[2], q.r_difference = d[3];
-      q.vx = v[0], q.vy = v[1], q.vz = v[2], q.r_sum = v[3];
+      q.x_ij = {d[0], d[1], d[2]}, q.r_difference = d[3], q.r_sum = v[3];
+      q.before.v = {v[0], v[1], v[2]};
       if constexpr (F.friction) {
         transpose(wi[0], wi[1], wi[2], wi[3]);
         transpose(wj[0], wj[1], wj[2], wj[3]);
-        q.wix = wi[0], q.wiy = wi[1], q.wiz = wi[2], q.wjx = wj[0], q.wjy = wj[1], q.wjz = wj[2];
+        q.before.omega_i = {wi[0], wi[1], wi[2]}, q.before.omega_j = {wj[0], wj[1], wj[2]};
       }
       if constexpr (F.viscous) {
-        NowLanes& m = now_lanes[g];
         for (int k = 0; k < 4; ++k) {
           const NowRow &a = now[p.i[k]], &b = now[p.j[k]];
           v[k] = row(a.v) - row(b.v), wi[k] = row(a.omega), wj[k] = row(b.omega);
@@ -348,44 +349,40 @@ void PairEngine::pair_forces(PairList& list, double dt) {
         transpose(v[0], v[1], v[2], v[3]);
         transpose(wi[0], wi[1], wi[2], wi[3]);
         transpose(wj[0], wj[1], wj[2], wj[3]);
-        m = {v[0], v[1], v[2], wi[0], wi[1], wi[2], wj[0], wj[1], wj[2]};
+        q.now = {{v[0], v[1], v[2]}, {wi[0], wi[1], wi[2]}, {wj[0], wj[1], wj[2]}};
       }
     }
 
+    for (int g = 0; g < block; ++g)
+      geometry[g] = between_grains(nearest_image(sides, lanes[g].x_ij), lanes[g].r_sum, lanes[g].r_difference);
+
+    if constexpr (F.friction)
+      for (int g = 0; g < block; ++g) {
+        const SpringGroup& s = list.springs[start + g];
+        trials[g] = stretch(dt, geometry[g], lanes[g].before, Vec3<Pack>{s.x, s.y, s.z});
+      }
+
     for (int g = 0; g < block; ++g) {
-      const Lanes& q = lanes[g];
       SpringGroup& s = list.springs[start + g];
-      const Vec3<Pack> x_ij = nearest_image(sides, Vec3<Pack>{q.x, q.y, q.z});
-      const Geometry<Pack> geometry = between_grains(x_ij, q.r_sum, q.r_difference);
-      const Motion<Pack> before{{q.vx, q.vy, q.vz}, {q.wix, q.wiy, q.wiz}, {q.wjx, q.wjy, q.wjz}};
-      Motion<Pack> at = before;
-      if constexpr (F.viscous) {
-        const NowLanes& m = now_lanes[g];
-        at = {{m.vx, m.vy, m.vz}, {m.wix, m.wiy, m.wiz}, {m.wjx, m.wjy, m.wjz}};
-      }
       Spring<Pack> spring{{s.x, s.y, s.z}, F.softening ? s.slipping : Pack(0.0)};
-      const Action<Pack> a = contact_law<F>(law, dt, geometry, before, at, spring);
-      Result& out = results[g];
-      out.fx = a.f.x, out.fy = a.f.y, out.fz = a.f.z;
-      out.slip = F.ledger ? a.slip : Pack(0.0);
-      if constexpr (F.friction) {
-        s.x = spring.delta_t.x, s.y = spring.delta_t.y, s.z = spring.delta_t.z;
-        if constexpr (F.softening) s.slipping = spring.slipping;
-        const Vec3<Pack> ti = -geometry.l_i * a.n_x_f, tj = -geometry.l_j * a.n_x_f;
-        out.tix = ti.x, out.tiy = ti.y, out.tiz = ti.z, out.tjx = tj.x, out.tjy = tj.y, out.tjz = tj.z;
-      }
-      if constexpr (F.viscous && F.ledger) out.power = a.viscous_power;
+      if constexpr (F.viscous)
+        actions[g] = respond<F>(law, geometry[g], lanes[g].now, trials[g], spring);
+      else
+        actions[g] = respond<F>(law, geometry[g], lanes[g].before, trials[g], spring);
+      if constexpr (F.friction) s.x = spring.delta_t.x, s.y = spring.delta_t.y, s.z = spring.delta_t.z;
+      if constexpr (F.softening) s.slipping = spring.slipping;
     }
 
     for (int g = 0; g < block; ++g) {
       const PairGroup& p = list.pairs[start + g];
-      const Result& out = results[g];
-      Pack f[4] = {out.fx, out.fy, out.fz, out.slip};
+      const Action<Pack>& action = actions[g];
+      Pack f[4] = {action.f.x, action.f.y, action.f.z, F.ledger ? action.slip : Pack(0.0)};
       transpose(f[0], f[1], f[2], f[3]);
       [[maybe_unused]] Pack ti[4], tj[4];
       if constexpr (F.friction) {
-        ti[0] = out.tix, ti[1] = out.tiy, ti[2] = out.tiz, ti[3] = F.viscous && F.ledger ? out.power : Pack(0.0);
-        tj[0] = out.tjx, tj[1] = out.tjy, tj[2] = out.tjz, tj[3] = 0.0;
+        const Vec3<Pack> on_i = -geometry[g].l_i * action.n_x_f, on_j = -geometry[g].l_j * action.n_x_f;
+        ti[0] = on_i.x, ti[1] = on_i.y, ti[2] = on_i.z, ti[3] = F.viscous && F.ledger ? action.viscous_power : Pack(0.0);
+        tj[0] = on_j.x, tj[1] = on_j.y, tj[2] = on_j.z, tj[3] = 0.0;
         transpose(ti[0], ti[1], ti[2], ti[3]);
         transpose(tj[0], tj[1], tj[2], tj[3]);
       }
@@ -397,7 +394,7 @@ void PairEngine::pair_forces(PairList& list, double dt) {
           set_row(a.torque, row(a.torque) + ti[k]);
           set_row(b.torque, row(b.torque) + tj[k]);
         } else if constexpr (F.viscous && F.ledger) {
-          a.viscous_power += out.power[k];
+          a.viscous_power += action.viscous_power[k];
         }
       }
     }

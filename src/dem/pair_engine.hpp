@@ -20,7 +20,7 @@ namespace moraine::dem {
 
 class PairEngine final : public Engine {
  public:
-  explicit PairEngine(int threads);
+  explicit PairEngine(int threads);  // 0: by the number of grains
 
   void load(const Scene& scene, const State& state) override;
   void advance(std::int64_t steps) override;
@@ -109,6 +109,7 @@ class PairEngine final : public Engine {
   template <Features F>
   void select_features();
 
+  const int threads_wanted_;
   Host space_;
   Scene scene_;
   Sides sides_;

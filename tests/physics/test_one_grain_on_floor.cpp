@@ -89,7 +89,7 @@ TEST_P(OneGrain, ObliqueImpactSlidesThroughout) {
   const auto engine = make();
   for (const double gamma : {0.0, 10.0}) {
     Scene s = on_floor(1e5, 0.2);
-    s.wall.gamma_n = gamma;
+    s.wall.gamma_n = s.wall.gamma_t = gamma;  // gamma_t: it slides at once, where a spring alone must load first
     const double w = std::sqrt(s.wall.k_n / mass(s, R)), v_n = 0.1, tan_theta = 3, v_t = v_n * tan_theta;
     s.dt = 1e-3 / w;
     const Vec3d along{0.6, -0.8, 0}, axis{0.8, 0.6, 0};

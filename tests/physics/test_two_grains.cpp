@@ -80,41 +80,55 @@ TEST_P(TwoGrains, HeadOnDamped) {
 
 ON_EVERY_BACKEND(TwoGrains);
 
-// A pair with a strained tangential spring, carried round once as one rigid body. Force and torque must turn with it.
-// The step is small because the contact's velocity is itself of second order in the angle: a pair that turns by a
-// radian in steps of theta gathers theta^2/6 of its size.
+// A pair with a strained tangential spring, carried round once as one rigid body, about four axes in the four lanes of a
+// Pack: two across the normal, along it, oblique. Force and torque must turn with it. The step is small because the
+// velocity at the contact is itself of second order in the angle: a pair that turns by one radian in steps of theta
+// gathers theta^2/6 of its size.
 TEST(RotatedPair, ForcesTurnWithIt) {
-  const double r_i = 0.012, r_j = 0.008, distance = 0.98 * (r_i + r_j), spring = 0.01 * distance;
+  using Vec3p = Vec3<Pack>;
+  const double r_i = 0.012, r_j = 0.008, distance = 0.98 * (r_i + r_j), strained = 0.01 * distance;
   const ContactParameters law{k, k, 0, 0, 1, 1};
   const double theta = 5e-7, dt = 1e-6;
   const auto steps = static_cast<std::int64_t>(2 * std::numbers::pi / theta);
-  const Vec3d n{1.0 / 3, 2.0 / 3, 2.0 / 3}, t{2.0 / 3, 1.0 / 3, -2.0 / 3};
-  const Vec3d oblique = (1 / length(n + 2.0 * t + cross(n, t))) * (n + 2.0 * t + cross(n, t));
 
-  for (const Vec3d& axis : {t, cross(n, t), n, oblique}) {
-    const auto turned = [&](const Vec3d& a, double angle) {
-      return std::cos(angle) * a + std::sin(angle) * cross(axis, a) + ((1 - std::cos(angle)) * dot(axis, a)) * axis;
-    };
-    for (const double strained : {0.0, spring}) {
-      const Vec3d first = strained / std::sqrt(2.0) * (t + cross(n, t));
-      Spring<double> s{first, 0};
-      const Vec3d omega = (theta / dt) * axis;
-      Action<double> a{};
-      for (std::int64_t step = 1; step <= steps; ++step) {
-        const double angle = static_cast<double>(step) * theta;
-        const auto g = between_grains(distance * turned(n, angle), r_i + r_j, r_i - r_j);
-        // (x(n) - x(n-1))/dt, without the cancellation
-        const Vec3d v = (2 * std::sin(0.5 * theta) / dt * distance) * cross(axis, turned(n, angle - 0.5 * theta));
-        a = contact_law<Features{true, false, false, true}>(law, dt, g, {v, omega, omega}, {v, omega, omega}, s);
-        ASSERT_EQ(a.slip, 0);
-      }
-      const double end = static_cast<double>(steps) * theta, scale = k * spring;
-      const Vec3d n_end = turned(n, end), f_t = a.f - dot(a.f, n_end) * n_end, expected = turned(-k * first, end);
-      EXPECT_NEAR(length(f_t), k * strained, 1e-10 * scale);
-      EXPECT_LT(length(f_t - expected), 1e-10 * scale);
-      EXPECT_LT(length(a.n_x_f - cross(n_end, expected)), 1e-10 * scale);
+  const Vec3d n{1.0 / 3, 2.0 / 3, 2.0 / 3}, t{2.0 / 3, 1.0 / 3, -2.0 / 3}, b = cross(n, t), o = n + 2.0 * t + b;
+  const Vec3d axes[4] = {t, b, n, 1 / length(o) * o};
+  const auto lanes = [](auto&& a) {  // a(lane) is a vector
+    return Vec3p{{a(0).x, a(1).x, a(2).x, a(3).x}, {a(0).y, a(1).y, a(2).y, a(3).y}, {a(0).z, a(1).z, a(2).z, a(3).z}};
+  };
+  const auto lane = [](const Vec3p& a, int l) { return Vec3d{a.x[l], a.y[l], a.z[l]}; };
+  const Vec3p axis = lanes([&](int l) { return axes[l]; }), n_0 = lanes([&](int) { return n; });
+  const Vec3p across = cross(axis, n_0), along = dot(axis, n_0) * axis, omega = Pack(theta / dt) * axis;
+  const auto turned = [&](double angle) {
+    return axpy(Pack(std::cos(angle)), n_0 - along, axpy(Pack(std::sin(angle)), across, along));
+  };
+
+  for (const double spring : {0.0, strained}) {
+    const Vec3d first = spring / std::sqrt(2.0) * (t + b);
+    Spring<Pack> s{lanes([&](int) { return first; }), 0.0};
+    Action<Pack> a{};
+    Pack slip = 0.0;
+    for (std::int64_t step = 1; step <= steps; ++step) {
+      const double angle = static_cast<double>(step) * theta;
+      const auto g = between_grains<Pack>(Pack(distance) * turned(angle), r_i + r_j, r_i - r_j);
+      // (x(n) - x(n-1))/dt, without the cancellation
+      const Vec3p v = Pack(2 * std::sin(0.5 * theta) / dt * distance) * cross(axis, turned(angle - 0.5 * theta));
+      const Motion<Pack> motion{v, omega, omega};
+      a = contact_law<Features{true, false, false, true}, Pack>(law, dt, g, motion, motion, s);
+      slip += a.slip;
+    }
+    const double end = static_cast<double>(steps) * theta, scale = k * strained;
+    for (int l = 0; l < 4; ++l) {
+      const auto expected = [&](const Vec3d& c) {  // Rodrigues
+        return std::cos(end) * c + std::sin(end) * cross(axes[l], c) + (1 - std::cos(end)) * dot(axes[l], c) * axes[l];
+      };
+      const Vec3d n_end = expected(n), f = lane(a.f, l), f_t = f - dot(f, n_end) * n_end;
+      EXPECT_EQ(slip[l], 0);
+      EXPECT_NEAR(length(f_t), k * spring, 1e-10 * scale) << "axis " << l;
+      EXPECT_LT(length(f_t - expected(-k * first)), 1e-10 * scale) << "axis " << l;
+      EXPECT_LT(length(lane(a.n_x_f, l) - expected(cross(n, -k * first))), 1e-10 * scale) << "axis " << l;
       // What the forces do to the pair, the torques undo.
-      EXPECT_LT(length(cross(distance * n_end, a.f) - distance * a.n_x_f), 1e-14 * distance * length(a.f));
+      EXPECT_LT(length(cross(distance * n_end, f) - distance * lane(a.n_x_f, l)), 1e-14 * distance * length(f));
     }
   }
 }

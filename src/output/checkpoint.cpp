@@ -1,0 +1,319 @@
+// The file mirrors the structs: numbers are attributes, lists are datasets, structs and lists of structs are
+// groups. Units and meanings are those of scene.hpp and state.hpp.
+#include <algorithm>
+#include <tuple>
+
+#include "error.hpp"
+#include "output/files.hpp"
+#include "output/hdf5.hpp"
+
+namespace moraine::output {
+
+template <>
+inline constexpr bool hdf5::all_doubles<Row> = true;
+
+namespace {
+
+constexpr std::int64_t format = 1;  // raise it with every change to a struct below
+
+// Every member of every stored struct, once, for writing and for reading. A new member is one more line; one
+// that is forgotten does not compile.
+template <class T, class M>
+struct Member {
+  const char* name;
+  M T::*pointer;
+};
+
+template <class T>
+constexpr std::tuple<> members{};
+
+template <>
+constexpr std::tuple members<dem::ContactParameters>{
+    Member{"k_n", &dem::ContactParameters::k_n},         Member{"k_t", &dem::ContactParameters::k_t},
+    Member{"gamma_n", &dem::ContactParameters::gamma_n}, Member{"gamma_t", &dem::ContactParameters::gamma_t},
+    Member{"mu_s", &dem::ContactParameters::mu_s},       Member{"mu_d", &dem::ContactParameters::mu_d},
+};
+
+template <>
+constexpr std::tuple members<dem::TopWall>{
+    Member{"drive", &dem::TopWall::drive},         Member{"mass", &dem::TopWall::mass},
+    Member{"sigma_0", &dem::TopWall::sigma_0},     Member{"amplitude", &dem::TopWall::amplitude},
+    Member{"frequency", &dem::TopWall::frequency}, Member{"phase", &dem::TopWall::phase},
+    Member{"velocity", &dem::TopWall::velocity},
+};
+
+template <>
+constexpr std::tuple members<dem::Shear>{
+    Member{"drive", &dem::Shear::drive},
+    Member{"velocity", &dem::Shear::velocity},
+    Member{"stress", &dem::Shear::stress},
+    Member{"hold_z", &dem::Shear::hold_z},
+};
+
+template <>
+constexpr std::tuple members<dem::Scene>{
+    Member{"box", &dem::Scene::box},
+    Member{"periodic_x", &dem::Scene::periodic_x},
+    Member{"periodic_y", &dem::Scene::periodic_y},
+    Member{"periodic_z", &dem::Scene::periodic_z},
+    Member{"floor", &dem::Scene::floor},
+    Member{"gravity", &dem::Scene::gravity},
+    Member{"density", &dem::Scene::density},
+    Member{"dt", &dem::Scene::dt},
+    Member{"grain", &dem::Scene::grain},
+    Member{"wall", &dem::Scene::wall},
+    Member{"top_wall", &dem::Scene::top_wall},
+    Member{"shear", &dem::Scene::shear},
+    Member{"neighbour_margin", &dem::Scene::neighbour_margin},
+    Member{"ledger", &dem::Scene::ledger},
+};
+
+template <>
+constexpr std::tuple members<dem::Contact>{
+    Member{"i", &dem::Contact::i},
+    Member{"j", &dem::Contact::j},
+    Member{"delta_t", &dem::Contact::delta_t},
+    Member{"slipping", &dem::Contact::slipping},
+};
+
+template <>
+constexpr std::tuple members<dem::WallContact>{
+    Member{"i", &dem::WallContact::i},
+    Member{"wall", &dem::WallContact::wall},
+    Member{"delta_t", &dem::WallContact::delta_t},
+    Member{"slipping", &dem::WallContact::slipping},
+};
+
+template <>
+constexpr std::tuple members<dem::Ledger>{
+    Member{"slip", &dem::Ledger::slip},
+    Member{"viscous", &dem::Ledger::viscous},
+    Member{"top_wall", &dem::Ledger::top_wall},
+    Member{"layers", &dem::Ledger::layers},
+    Member{"viscous_power", &dem::Ledger::viscous_power},
+};
+
+template <>
+constexpr std::tuple members<dem::State>{
+    Member{"id", &dem::State::id},
+    Member{"r", &dem::State::r},
+    Member{"x", &dem::State::x},
+    Member{"v", &dem::State::v},
+    Member{"omega", &dem::State::omega},
+    Member{"rotation", &dem::State::rotation},
+    Member{"force", &dem::State::force},
+    Member{"torque", &dem::State::torque},
+    Member{"x_start", &dem::State::x_start},
+    Member{"role", &dem::State::role},
+    Member{"contacts", &dem::State::contacts},
+    Member{"wall_contacts", &dem::State::wall_contacts},
+    Member{"wall_z", &dem::State::wall_z},
+    Member{"wall_v", &dem::State::wall_v},
+    Member{"wall_force", &dem::State::wall_force},
+    Member{"shear_force", &dem::State::shear_force},
+    Member{"layer_u", &dem::State::layer_u},
+    Member{"ledger", &dem::State::ledger},
+    Member{"step", &dem::State::step},
+    Member{"staggered", &dem::State::staggered},
+};
+
+template <>
+constexpr std::tuple members<SnapshotInfo>{
+    Member{"file", &SnapshotInfo::file},
+    Member{"time", &SnapshotInfo::time},
+    Member{"grains", &SnapshotInfo::grains},
+    Member{"contacts", &SnapshotInfo::contacts},
+};
+
+template <>
+constexpr std::tuple members<Checkpoint>{
+    Member{"case_text", &Checkpoint::case_text}, Member{"version", &Checkpoint::version},
+    Member{"stage", &Checkpoint::stage},         Member{"stage_start_time", &Checkpoint::stage_start_time},
+    Member{"height_0", &Checkpoint::height_0},   Member{"energy_0", &Checkpoint::energy_0},
+    Member{"finished", &Checkpoint::finished},   Member{"scene", &Checkpoint::scene},
+    Member{"state", &Checkpoint::state},         Member{"rows", &Checkpoint::rows},
+    Member{"snapshots", &Checkpoint::snapshots},
+};
+
+// The largest value of an enumeration; those stored start from 0.
+template <class E>
+constexpr E last = E{};
+template <>
+constexpr auto last<dem::TopWall::Drive> = dem::TopWall::Drive::velocity;
+template <>
+constexpr auto last<dem::Shear::Drive> = dem::Shear::Drive::stress;
+template <>
+constexpr auto last<dem::Role> = dem::Role::top;
+template <>
+constexpr auto last<dem::WallName> = dem::WallName::top;
+
+template <class T>
+constexpr bool is_list = false;
+template <class T>
+constexpr bool is_list<std::vector<T>> = true;
+
+// Counts the members of an aggregate by how many initialisers it takes.
+struct Anything {
+  template <class T>
+  operator T() const;
+};
+template <class T, class... Given>
+constexpr std::size_t member_count() {
+  if constexpr (requires { T{Given{}..., Anything{}}; }) {
+    return member_count<T, Given..., Anything>();
+  } else {
+    return sizeof...(Given);
+  }
+}
+
+template <class T>
+constexpr bool is_stored_struct = [] {
+  constexpr std::size_t described = std::tuple_size_v<std::remove_cvref_t<decltype(members<T>)>>;
+  if constexpr (described > 0)
+    static_assert(described == member_count<T>(), "a member is missing from the list");
+  return described > 0;
+}();
+
+template <class T, class F>
+void for_each_member(F f) {
+  std::apply([&](const auto&... member) { (f(member.name, member.pointer), ...); }, members<T>);
+}
+
+template <class T>
+void put_list(const hdf5::Group& group, const char* name, const std::vector<T>& list) {
+  if constexpr (is_stored_struct<T>) {
+    const hdf5::Group inner = group.create_group(name);
+    for_each_member<T>([&](const char* member, auto pointer) {
+      std::vector<std::decay_t<decltype(list[0].*pointer)>> column;
+      for (const T& entry : list) column.push_back(entry.*pointer);
+      put_list(inner, member, column);
+    });
+  } else {
+    group.write(name, list);
+  }
+}
+
+template <class T>
+void put(const hdf5::Group& group, const char* name, const T& value) {
+  if constexpr (is_list<T>) {
+    put_list(group, name, value);
+  } else if constexpr (is_stored_struct<T>) {
+    const hdf5::Group inner = group.create_group(name);
+    for_each_member<T>([&](const char* member, auto pointer) { put(inner, member, value.*pointer); });
+  } else if constexpr (std::same_as<T, bool>) {
+    group.set(name, std::uint8_t{value});
+  } else {
+    group.set(name, value);
+  }
+}
+
+template <class T>
+void check_enumeration(const hdf5::Group& group, const char* name, const T& value) {
+  if constexpr (std::is_enum_v<T>) {
+    if (value >= T{} && value <= last<T>) return;
+    throw error(group.where(name), ": ", static_cast<long>(value), " is not a value from 0 to ",
+                static_cast<long>(last<T>));
+  }
+}
+
+template <class T>
+void get_list(const hdf5::Group& group, const char* name, std::vector<T>& list) {
+  if constexpr (is_stored_struct<T>) {
+    const hdf5::Group inner = group.open_group(name);
+    bool first = true;
+    for_each_member<T>([&](const char* member, auto pointer) {
+      std::vector<std::decay_t<decltype(list[0].*pointer)>> column;
+      get_list(inner, member, column);
+      if (std::exchange(first, false)) list.resize(column.size());
+      if (column.size() != list.size()) {
+        throw error(inner.where(member), ": ", column.size(), " values, ", list.size(), " expected");
+      }
+      for (std::size_t k = 0; k < list.size(); ++k) list[k].*pointer = column[k];
+    });
+  } else {
+    group.read(name, list);
+    for (const T& value : list) check_enumeration(group, name, value);
+  }
+}
+
+template <class T>
+void get(const hdf5::Group& group, const char* name, T& value) {
+  if constexpr (is_list<T>) {
+    get_list(group, name, value);
+  } else if constexpr (is_stored_struct<T>) {
+    const hdf5::Group inner = group.open_group(name);
+    for_each_member<T>([&](const char* member, auto pointer) { get(inner, member, value.*pointer); });
+  } else if constexpr (std::same_as<T, bool>) {
+    std::uint8_t number = 0;
+    group.get(name, number);
+    value = number != 0;
+  } else {
+    group.get(name, value);
+    check_enumeration(group, name, value);
+  }
+}
+
+// A file can be sound and its content still not be a state.
+void validate(const std::string& file, const dem::State& state) {
+  const std::size_t n = state.r.size();
+  const auto fail = [&](const auto&... parts) { throw error(file, ": /state: ", parts...); };
+
+  for_each_member<dem::State>([&](const char* name, auto pointer) {
+    using List = std::decay_t<decltype(state.*pointer)>;
+    if constexpr (is_list<List>) {
+      const std::size_t size = (state.*pointer).size();
+      if (!is_stored_struct<typename List::value_type> && size != n)
+        fail(name, " has ", size, " rows, r has ", n);
+    }
+  });
+
+  std::vector<bool> seen(n);
+  for (const dem::Index id : state.id) {
+    if (id < 0 || static_cast<std::size_t>(id) >= n || seen[static_cast<std::size_t>(id)]) {
+      fail("id ", id, " is out of range or given twice among ", n, " grains");
+    }
+    seen[static_cast<std::size_t>(id)] = true;
+  }
+  const auto grain = [n](dem::Index i) { return i >= 0 && static_cast<std::size_t>(i) < n; };
+  for (const dem::Contact& c : state.contacts) {
+    if (!grain(c.i) || !grain(c.j) || c.i >= c.j)
+      fail("no contact can be between grains ", c.i, " and ", c.j);
+  }
+  for (const dem::WallContact& c : state.wall_contacts) {
+    if (!grain(c.i)) fail("no wall contact can be of grain ", c.i);
+  }
+  const auto pair = [](const dem::Contact& c) { return std::pair(c.i, c.j); };
+  const auto wall_pair = [](const dem::WallContact& c) { return std::pair(c.wall, c.i); };
+  if (!std::ranges::is_sorted(state.contacts, {}, pair)) fail("contacts are not sorted by (i, j)");
+  if (!std::ranges::is_sorted(state.wall_contacts, {}, wall_pair))
+    fail("wall_contacts are not sorted by (wall, i)");
+}
+
+}  // namespace
+
+void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint) {
+  const auto file = hdf5::File::in_memory(path);
+  file.set("program", std::string("moraine"));
+  file.set("format", format);
+  for_each_member<Checkpoint>([&](const char* name, auto pointer) { put(file, name, checkpoint.*pointer); });
+  file.save();
+}
+
+Checkpoint read_checkpoint(const std::filesystem::path& path) {
+  const auto file = hdf5::File::open(path, H5F_ACC_RDONLY);
+  std::string program;
+  std::int64_t found = 0;
+  if (file.has("program")) file.get("program", program);
+  if (program != "moraine" || !file.has("format")) throw error(file.where(), ": not a checkpoint of moraine");
+  file.get("format", found);
+  if (found > format) {
+    throw error(file.where(), ": written by a later version of moraine (checkpoint format ", found,
+                "; this one reads up to ", format, ")");
+  }
+  Checkpoint checkpoint;
+  for_each_member<Checkpoint>([&](const char* name, auto pointer) { get(file, name, checkpoint.*pointer); });
+  validate(file.where(), checkpoint.state);
+  return checkpoint;
+}
+
+}  // namespace moraine::output

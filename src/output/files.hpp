@@ -1,0 +1,102 @@
+// What a run leaves in CASE/output. Every file appears whole (written aside, then renamed) or, for series.h5,
+// grows by whole rows that a reader may follow while the run goes on (HDF5 SWMR).
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "dem/observe.hpp"
+#include "dem/scene.hpp"
+#include "dem/state.hpp"
+
+namespace moraine::output {
+
+// One column of series.h5. The list is the single place that names them.
+struct Column {
+  const char* name;
+  const char* units;
+  const char* meaning;
+};
+
+// One row; the order of the columns is that of the members.
+struct Row {
+  double stage;               // index of the stage
+  double step;                // steps since the stage began
+  double time;                // s, since the case began
+  double stage_time;          // s, since the stage began
+  double shear_strain;        // 1
+  double shear_stress;        // Pa
+  double normal_stress;       // Pa
+  double shear_friction;      // 1
+  double height;              // m
+  double dilation;            // m
+  double dilation_diameters;  // mean grain diameters
+  double porosity;            // 1
+  double mean_overlap;        // m
+  double max_overlap;         // m
+  double coordination;        // contacts per grain
+  double unbalanced_force;    // 1
+  double kinetic, rotational, elastic_normal, elastic_tangential, potential, wall_kinetic;  // J
+  double slip, viscous, top_wall_work, layers_work;                                         // J
+  double residue;  // J, since the stage began
+};
+const std::vector<Column>& columns();  // as many as Row has doubles, in its order
+
+// series.h5: one extendible chunked dataset of doubles for each column, each with attributes `units` and
+// `meaning`.
+class Series {
+ public:
+  // Creates PATH anew holding `rows` (written aside and renamed), then opens it for appending in SWMR mode.
+  Series(const std::filesystem::path& path, const std::vector<Row>& rows);
+  ~Series();
+  void append(const Row& row);  // flushed: a reader sees it at once
+  const std::vector<Row>& rows() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// Reads series.h5 back, also while another process appends (SWMR). Throws Error.
+std::vector<Row> read_series(const std::filesystem::path& path);
+
+// snapshots/NAME.h5, grains in the order of their ids, contacts with force vectors; attributes time, stage,
+// step. All datasets carry `units`. NAME comes from stage and number: e.g. 02-shear-000040.h5.
+struct SnapshotInfo {
+  std::string file;  // name within snapshots/
+  double time;       // s, since the case began
+  std::int64_t grains, contacts;
+};
+SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::string& name, double time,
+                            const dem::Scene& scene, const dem::State& staggered);
+// snapshots/grains.xdmf and snapshots/contacts.xdmf: time series for ParaView (XDMF 3, Polyvertex with a
+// radius; contacts as points with force vectors). Rewritten whole.
+void write_xdmf(const std::filesystem::path& directory, const std::vector<SnapshotInfo>& snapshots);
+
+// checkpoint.h5: all that is needed to go on with the same bits, the series so far included.
+struct Checkpoint {
+  std::string case_text;  // resolved case
+  std::string version;
+  std::int64_t stage = 0;       // index; == number of stages when the case has finished
+  double stage_start_time = 0;  // s, since the case began
+  double height_0 = 0;          // m, when the stage began
+  double energy_0 = 0;          // J, when the stage began
+  bool finished = false;
+  dem::Scene scene;  // of the stage
+  dem::State state;
+  std::vector<Row> rows;
+  std::vector<SnapshotInfo> snapshots;
+};
+void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint);
+// Throws Error naming the file and what is wrong: missing, no HDF5 file, truncated, not of this program, of a
+// later version.
+Checkpoint read_checkpoint(const std::filesystem::path& path);
+
+// Writes text (or any bytes) aside, waits until the disk has it, and renames it. Throws Error (path, cause:
+// disk full, permission), and then leaves what stood there before.
+void write_text(const std::filesystem::path& path, std::string_view text);
+
+}  // namespace moraine::output

@@ -1,0 +1,203 @@
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <sstream>
+
+#include "error.hpp"
+#include "output/files.hpp"
+#include "output/hdf5.hpp"
+
+namespace moraine::output {
+namespace {
+
+using dem::Index;
+using dem::Vec3d;
+
+double wrap(double x, double length) {
+  const double wrapped = x - length * std::floor(x / length);
+  return wrapped < length ? wrapped : 0;  // a tiny negative x rounds up to the far side
+}
+
+Vec3d wrap(const dem::Scene& scene, Vec3d x) {
+  if (scene.periodic_x) x.x = wrap(x.x, scene.box.x);
+  if (scene.periodic_y) x.y = wrap(x.y, scene.box.y);
+  if (scene.periodic_z) x.z = wrap(x.z, scene.box.z);
+  return x;
+}
+
+// A list in the order of `rows`, each passed through `f`.
+template <class T, class F = std::identity>
+auto arrange(const std::vector<T>& list, const std::vector<std::size_t>& rows, F f = {}) {
+  std::vector<std::decay_t<std::invoke_result_t<F, const T&>>> arranged;
+  arranged.reserve(rows.size());
+  for (const std::size_t row : rows) arranged.push_back(std::invoke(f, list[row]));
+  return arranged;
+}
+
+template <class Less>
+std::vector<std::size_t> sorted_rows(std::size_t count, Less less) {
+  std::vector<std::size_t> rows(count);
+  std::iota(rows.begin(), rows.end(), 0);
+  std::sort(rows.begin(), rows.end(), less);
+  return rows;
+}
+
+void write_grains(const hdf5::Group& grains, const dem::Scene& scene, const dem::State& state) {
+  const auto rows = sorted_rows(state.id.size(), [&](auto a, auto b) { return state.id[a] < state.id[b]; });
+  std::vector<Vec3d> displacement = state.x;
+  for (std::size_t k = 0; k < displacement.size(); ++k) displacement[k] -= state.x_start[k];
+
+  grains.write("id", arrange(state.id, rows), "1");
+  grains.write("role", arrange(state.role, rows), "1");
+  grains.write("radius", arrange(state.r, rows), "m");
+  grains.write("position", arrange(state.x, rows, [&](const Vec3d& x) { return wrap(scene, x); }), "m");
+  grains.write("displacement", arrange(displacement, rows), "m");
+  grains.write("velocity", arrange(dem::velocity(scene, state), rows), "m/s");
+  grains.write("spin", arrange(state.omega, rows), "rad/s");
+  grains.write("rotation", arrange(state.rotation, rows), "rad");
+  grains.write("pressure", arrange(dem::grain_pressure(scene, state), rows), "Pa");
+}
+
+// Grains by their ids, i < j, sorted: the file does not depend on the memory order. Forces are on i.
+std::int64_t write_contacts(const hdf5::Group& group, const dem::Scene& scene, const dem::State& state) {
+  using dem::ContactForce;
+  std::vector<ContactForce> contacts = dem::contact_forces(scene, state);
+  for (ContactForce& c : contacts) {
+    c.i = state.id[static_cast<std::size_t>(c.i)];
+    c.j = state.id[static_cast<std::size_t>(c.j)];
+    if (c.i < c.j) continue;
+    std::swap(c.i, c.j);
+    c.f_n = -c.f_n;
+    c.f_t = -c.f_t;
+  }
+  const auto rows = sorted_rows(contacts.size(), [&](auto a, auto b) {
+    return std::pair(contacts[a].i, contacts[a].j) < std::pair(contacts[b].i, contacts[b].j);
+  });
+  std::vector<Index> number(contacts.size());
+  std::iota(number.begin(), number.end(), 0);
+
+  group.write("id", number, "1");
+  group.write("i", arrange(contacts, rows, &ContactForce::i), "1");
+  group.write("j", arrange(contacts, rows, &ContactForce::j), "1");
+  group.write("point", arrange(contacts, rows, [&](const auto& c) { return wrap(scene, c.point); }), "m");
+  group.write("force_normal", arrange(contacts, rows, &ContactForce::f_n), "N");
+  group.write("force_tangential", arrange(contacts, rows, &ContactForce::f_t), "N");
+  group.write("force", arrange(contacts, rows, [](const auto& c) { return c.f_n + c.f_t; }), "N");
+  group.write("overlap", arrange(contacts, rows, &ContactForce::overlap), "m");
+  return static_cast<std::int64_t>(contacts.size());
+}
+
+struct Field {
+  const char* name;
+  const char* number;  // of XDMF: type and bytes
+  int columns = 1;
+  const char* missing = "0";
+};
+constexpr const char* real = R"(NumberType="Float" Precision="8")";
+constexpr const char* integer = R"(NumberType="Int" Precision="4")";
+constexpr const char* byte = R"(NumberType="UChar" Precision="1")";
+
+struct Cloud {
+  const char* group;
+  Field points;
+  std::vector<Field> fields;
+  std::int64_t SnapshotInfo::*count;
+};
+
+const Cloud clouds[] = {
+    {"grains",
+     {"position", real, 3},
+     {{"id", integer},
+      {"role", byte},
+      {"radius", real},
+      {"displacement", real, 3},
+      {"velocity", real, 3},
+      {"spin", real, 3},
+      {"rotation", real, 3},
+      {"pressure", real}},
+     &SnapshotInfo::grains},
+    {"contacts",
+     {"point", real, 3},
+     {{"i", integer, 1, "-1"},
+      {"j", integer, 1, "-1"},
+      {"force_normal", real, 3},
+      {"force_tangential", real, 3},
+      {"force", real, 3},
+      {"overlap", real}},
+     &SnapshotInfo::contacts},
+};
+
+std::string shortest(double number) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, number).ptr};
+}
+
+// One step. XDMF readers know no empty cloud: a step without contacts shows one point without force, i = j =
+// -1.
+void write_grid(std::ostream& text, const Cloud& cloud, const SnapshotInfo& snapshot) {
+  const std::int64_t found = snapshot.*cloud.count, count = std::max<std::int64_t>(found, 1);
+  const auto data = [&](const Field& field) {
+    text << "<DataItem Format=\"" << (found ? "HDF" : "XML") << "\" " << field.number << " Dimensions=\""
+         << count;
+    if (field.columns > 1) text << ' ' << field.columns;
+    text << "\">";
+    if (found) {
+      text << snapshot.file << ":/" << cloud.group << '/' << field.name;
+    } else {
+      text << (field.columns == 3 ? "0 0 0" : field.missing);
+    }
+    text << "</DataItem>";
+  };
+  text << "<Grid Name=\"" << cloud.group << "\"><Time Value=\"" << shortest(snapshot.time) << "\"/>\n";
+  // The ids 0, 1, ... serve as the list of vertices, which some readers want.
+  text << "<Topology TopologyType=\"Polyvertex\" NodesPerElement=\"1\" NumberOfElements=\"" << count << "\">";
+  data({"id", integer});
+  text << "</Topology>\n<Geometry GeometryType=\"XYZ\">";
+  data(cloud.points);
+  text << "</Geometry>\n";
+  for (const Field& field : cloud.fields) {
+    text << "<Attribute Name=\"" << field.name << "\" Center=\"Node\" AttributeType=\""
+         << (field.columns == 3 ? "Vector" : "Scalar") << "\">";
+    data(field);
+    text << "</Attribute>\n";
+  }
+  text << "</Grid>\n";
+}
+
+std::string xdmf(const Cloud& cloud, const std::vector<SnapshotInfo>& snapshots) {
+  std::ostringstream text;
+  text << "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Xdmf Version=\"3.0\">\n<Domain>\n"
+       << "<Grid Name=\"" << cloud.group << "\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
+  for (const SnapshotInfo& snapshot : snapshots) write_grid(text, cloud, snapshot);
+  text << "</Grid>\n</Domain>\n</Xdmf>\n";
+  return text.str();
+}
+
+}  // namespace
+
+SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::string& name, double time,
+                            const dem::Scene& scene, const dem::State& staggered) {
+  SnapshotInfo info{name + ".h5", time, staggered.size(), 0};
+  const auto file = hdf5::File::in_memory(directory / info.file);
+  file.set("program", std::string("moraine"));
+  file.set("name", name);
+  file.set("time", time);
+  file.set("step", staggered.step);
+  file.set("stage_time", static_cast<double>(staggered.step) * scene.dt);
+  file.set("box", scene.box);
+  file.set("top_wall", staggered.wall_z);
+  write_grains(file.create_group("grains"), scene, staggered);
+  info.contacts = write_contacts(file.create_group("contacts"), scene, staggered);
+  file.save();
+  return info;
+}
+
+void write_xdmf(const std::filesystem::path& directory, const std::vector<SnapshotInfo>& snapshots) {
+  for (const Cloud& cloud : clouds) {
+    write_text(directory / (std::string(cloud.group) + ".xdmf"), xdmf(cloud, snapshots));
+  }
+}
+
+}  // namespace moraine::output

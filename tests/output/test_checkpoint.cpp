@@ -1,0 +1,174 @@
+#include <gtest/gtest.h>
+#include <hdf5.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <limits>
+
+#include "samples.hpp"
+#include "temporary_directory.hpp"
+
+namespace moraine::output {
+namespace {
+
+Checkpoint sample(dem::Index grains) {
+  RandomNumbers number;
+  Checkpoint c;
+  c.case_text = "title = \"Grund \xc3\xbc\"\n" + std::string(200'000, '#');
+  c.version = "1.2.3";
+  c.stage = 2;
+  c.stage_start_time = number();
+  c.height_0 = -0.0;
+  c.energy_0 = std::numeric_limits<double>::denorm_min();
+  c.finished = true;
+  c.scene.box = number.vector();
+  c.scene.periodic_y = false;
+  c.scene.dt = 1e-7 / 3;
+  c.scene.grain.mu_d = number();
+  c.scene.wall.k_n = number();
+  c.scene.top_wall.drive = dem::TopWall::Drive::velocity;
+  c.scene.shear = {dem::Shear::Drive::stress, number(), number(), true};
+  c.state = random_state(number, grains);
+  for (dem::Index k = 0; k < grains; ++k) {
+    c.rows.push_back(number.row());
+    c.snapshots.push_back({"02-shear-" + std::to_string(k) + ".h5", number(), grains, k});
+  }
+  return c;
+}
+
+class CheckpointFile : public testing::Test {
+ protected:
+  std::string why_not() const {
+    return message([&] { read_checkpoint(path); });
+  }
+  // Overwrites a number of the file in place, wherever it stands in the groups.
+  template <class T>
+  void change(const std::string& dataset, hid_t type, std::vector<T> values) const {
+    const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    const hid_t id = H5Dopen2(file, dataset.c_str(), H5P_DEFAULT);
+    ASSERT_GE(H5Dwrite(id, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0);
+    H5Dclose(id);
+    H5Fclose(file);
+  }
+
+  TemporaryDirectory directory;
+  std::filesystem::path path = directory.path() / "checkpoint.h5";
+};
+
+TEST_F(CheckpointFile, KeepsEveryBit) {
+  for (const dem::Index grains : {0, 1, 100}) {
+    const Checkpoint written = sample(grains);
+    write_checkpoint(path, written);
+    const Checkpoint read = read_checkpoint(path);
+
+    EXPECT_EQ(read.case_text, written.case_text);
+    EXPECT_EQ(read.state.id, written.state.id);
+    EXPECT_EQ(read.state.x, written.state.x);
+    EXPECT_EQ(read.state.role, written.state.role);
+    EXPECT_EQ(read.state.step, written.state.step);
+    EXPECT_TRUE(std::signbit(read.height_0));
+    EXPECT_EQ(read.energy_0, written.energy_0);
+    ASSERT_EQ(read.rows.size(), written.rows.size());
+    EXPECT_TRUE(std::equal(read.rows.begin(), read.rows.end(), written.rows.begin(), same_bits));
+
+    // Every other member: what was read gives the same bytes again.
+    const auto again = directory.path() / "again.h5";
+    write_checkpoint(again, read);
+    EXPECT_EQ(contents(path), contents(again));
+  }
+}
+
+TEST_F(CheckpointFile, KeepsEmptyTexts) {
+  Checkpoint c = sample(2);
+  c.case_text = c.version = "";
+  c.snapshots[0].file = "";
+  write_checkpoint(path, c);
+  const Checkpoint read = read_checkpoint(path);
+  EXPECT_EQ(read.case_text, "");
+  EXPECT_EQ(read.snapshots[0].file, "");
+}
+
+TEST_F(CheckpointFile, RefusesWhatIsNoCheckpoint) {
+  EXPECT_EQ(why_not(), path.string() + ": cannot open the file: No such file or directory");
+
+  directory.write("checkpoint.h5", "");
+  EXPECT_EQ(why_not(), path.string() + ": not an HDF5 file");
+  directory.write("checkpoint.h5", std::string(100'000, 'x'));
+  EXPECT_EQ(why_not(), path.string() + ": not an HDF5 file");
+
+  { Series series(path, {}); }
+  EXPECT_EQ(why_not(), path.string() + ": not a checkpoint of moraine");
+}
+
+TEST_F(CheckpointFile, RefusesOneThatWasCutShort) {
+  write_checkpoint(path, sample(100));
+  const std::string whole = contents(path);
+  for (std::size_t size = 8; size < whole.size(); size += 997) {
+    directory.write("checkpoint.h5", whole.substr(0, size));
+    EXPECT_TRUE(contains(why_not(), path.string() + ": ")) << "cut at " << size;
+  }
+  EXPECT_TRUE(contains(why_not(), "truncated")) << why_not();
+}
+
+TEST_F(CheckpointFile, RefusesALaterFormat) {
+  write_checkpoint(path, sample(2));
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  const hid_t format = H5Aopen(file, "format", H5P_DEFAULT);
+  const std::int64_t later = 1000;
+  ASSERT_GE(H5Awrite(format, H5T_NATIVE_INT64, &later), 0);
+  H5Aclose(format);
+  H5Fclose(file);
+  EXPECT_TRUE(contains(why_not(), path.string() + ": written by a later version")) << why_not();
+}
+
+TEST_F(CheckpointFile, RefusesWhatIsNoState) {
+  const auto refused = [&](const char* part) {
+    return contains(why_not(), path.string() + ": /state") && contains(why_not(), part);
+  };
+  Checkpoint c = sample(3);
+
+  c.state.x.pop_back();
+  write_checkpoint(path, c);
+  EXPECT_TRUE(refused("x has 2 rows, r has 3")) << why_not();
+
+  write_checkpoint(path, sample(3));
+  change<dem::Index>("state/id", H5T_NATIVE_INT32, {0, 1, 1});
+  EXPECT_TRUE(refused("id 1 is out of range or given twice")) << why_not();
+
+  write_checkpoint(path, sample(3));
+  change<dem::Index>("state/contacts/j", H5T_NATIVE_INT32, {1, 3});
+  EXPECT_TRUE(refused("between grains 1 and 3")) << why_not();
+
+  write_checkpoint(path, sample(3));
+  change<std::uint8_t>("state/role", H5T_NATIVE_UINT8, {0, 3, 1});
+  EXPECT_TRUE(refused("/role: 3 is not a value from 0 to 2")) << why_not();
+
+  write_checkpoint(path, sample(3));
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  H5Ldelete(file, "state/torque", H5P_DEFAULT);
+  H5Fclose(file);
+  EXPECT_TRUE(refused("/torque: cannot open the dataset")) << why_not();
+}
+
+TEST_F(CheckpointFile, OutlivesAKilledWriter) {
+  write_checkpoint(path, sample(10));
+  const std::string before = contents(path);
+  const Checkpoint large = sample(5000);
+  for (const int microseconds : {0, 2000, 5000, 20000, 50000}) {
+    const pid_t writer = fork();
+    if (writer == 0) {
+      for (;;) write_checkpoint(path, large);
+    }
+    usleep(static_cast<useconds_t>(microseconds));
+    kill(writer, SIGKILL);
+    waitpid(writer, nullptr, 0);
+    const dem::Index grains = read_checkpoint(path).state.size();
+    EXPECT_TRUE(grains == 10 || grains == 5000);
+  }
+  write_checkpoint(path, sample(10));
+  EXPECT_EQ(contents(path), before);
+}
+
+}  // namespace
+}  // namespace moraine::output

@@ -1,0 +1,128 @@
+#include <gtest/gtest.h>
+#include <hdf5.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "samples.hpp"
+#include "temporary_directory.hpp"
+
+namespace moraine::output {
+namespace {
+
+class SeriesFile : public testing::Test {
+ protected:
+  std::vector<Row> some_rows(int count) {
+    std::vector<Row> rows;
+    for (int k = 0; k < count; ++k) rows.push_back(number.row());
+    return rows;
+  }
+  void expect_rows(const std::vector<Row>& rows) {
+    const std::vector<Row> read = read_series(path);
+    ASSERT_EQ(read.size(), rows.size());
+    EXPECT_TRUE(std::equal(read.begin(), read.end(), rows.begin(), same_bits));
+  }
+  bool opens_plainly() const {
+    const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+    if (file >= 0) H5Fclose(file);
+    return file >= 0;
+  }
+
+  RandomNumbers number;
+  TemporaryDirectory directory;
+  std::filesystem::path path = directory.path() / "series.h5";
+};
+
+TEST_F(SeriesFile, NamesEveryMemberOfARow) {
+  EXPECT_EQ(columns().size() * sizeof(double), sizeof(Row));
+  Row row{};
+  row.shear_friction = 0.6;
+  row.residue = 1e-9;
+  { Series series(path, {row}); }
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  for (const auto& [name, value] : {std::pair{"shear_friction", 0.6}, {"residue", 1e-9}}) {
+    double read = 0;
+    const hid_t dataset = H5Dopen2(file, name, H5P_DEFAULT);
+    H5Dread(dataset, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, &read);
+    EXPECT_EQ(read, value);
+    EXPECT_GT(H5Aexists(dataset, "units"), 0);
+    H5Dclose(dataset);
+  }
+  H5Fclose(file);
+}
+
+TEST_F(SeriesFile, KeepsEveryBit) {
+  for (const int given : {0, 1, 700}) {
+    std::vector<Row> rows = some_rows(given);
+    {
+      Series series(path, rows);
+      expect_rows(rows);
+      for (int k = 0; k < 300; ++k) {
+        rows.push_back(number.row());
+        series.append(rows.back());
+      }
+      expect_rows(rows);
+      EXPECT_EQ(series.rows().size(), rows.size());
+    }
+    expect_rows(rows);
+    EXPECT_TRUE(opens_plainly());
+  }
+}
+
+TEST_F(SeriesFile, CanBeReadWhileItGrows) {
+  const std::vector<Row> rows = some_rows(600);
+  const pid_t reader = fork();  // before the file is open: HDF5 would give the child its parent's view of it
+  if (reader == 0) {
+    while (!exists(path)) usleep(100);
+    std::size_t seen = 0;
+    const std::string complaint = message([&] {
+      while (seen < rows.size()) {
+        const std::vector<Row> read = read_series(path);
+        if (read.size() < seen) throw error("rows have gone: ", read.size(), " of ", seen);
+        seen = read.size();
+        if (!std::equal(read.begin(), read.end(), rows.begin(), same_bits)) throw error("another row");
+      }
+    });
+    std::fputs(complaint.c_str(), stderr);
+    _exit(complaint.empty() ? 0 : 1);
+  }
+  Series series(path, {});
+  for (const Row& row : rows) {
+    series.append(row);
+    usleep(200);
+  }
+  int status = 0;
+  waitpid(reader, &status, 0);
+  EXPECT_EQ(status, 0);
+}
+
+TEST_F(SeriesFile, IsReadAndReplacedAfterAKill) {
+  const std::vector<Row> rows = some_rows(5);
+  const pid_t writer = fork();
+  if (writer == 0) {
+    Series series(path, {});
+    for (const Row& row : rows) series.append(row);
+    raise(SIGKILL);
+  }
+  waitpid(writer, nullptr, 0);
+  expect_rows(rows);
+
+  {
+    Series series(path, {rows[0], rows[1]});
+    series.append(rows[2]);
+  }
+  expect_rows({rows[0], rows[1], rows[2]});
+  EXPECT_TRUE(opens_plainly());
+}
+
+TEST_F(SeriesFile, RefusesWhatIsNoSeries) {
+  const auto why_not = [&] { return message([&] { read_series(path); }); };
+  EXPECT_EQ(why_not(), path.string() + ": cannot open the file: No such file or directory");
+  directory.write("series.h5", "time,stress\n");
+  EXPECT_EQ(why_not(), path.string() + ": not an HDF5 file");
+  write_checkpoint(path, {});
+  EXPECT_TRUE(contains(why_not(), path.string() + ": /stage: cannot open the dataset")) << why_not();
+}
+
+}  // namespace
+}  // namespace moraine::output

@@ -1,0 +1,145 @@
+#include <gtest/gtest.h>
+#include <hdf5.h>
+#include <sys/wait.h>
+
+#include "output/hdf5.hpp"
+#include "samples.hpp"
+#include "temporary_directory.hpp"
+
+namespace moraine::output {
+namespace {
+
+using dem::Vec3d;
+
+// Three grains in a row along x in a periodic box, the last touching the first across the border.
+struct Bed {
+  dem::Scene scene;
+  dem::State state;
+  Bed() {
+    scene.box = {3, 3, 3};
+    scene.dt = 1e-3;
+    auto& s = state;
+    s.id = {2, 0, 1};
+    s.r = {0.6, 0.5, 0.55};
+    s.x = {{5.45, -0.1, 1}, {0.5, -0.1, 1}, {1.4, -0.1, 1}};
+    s.x_start = {{-0.55, -0.1, 1}, {0.5, -0.1, 1}, {1.4, -0.1, 0.5}};
+    s.v = {{3, 0, 0}, {1, 0, 0}, {2, 0, 0}};
+    s.omega = s.rotation = s.force = s.torque = std::vector<Vec3d>(3, Vec3d{0, 0, 0});
+    s.role = {dem::Role::top, dem::Role::bottom, dem::Role::free};
+    s.contacts = {{0, 1, {0, 0, 0}, 0}, {0, 2, {0, 0, 0}, 0}, {1, 2, {0, 1e-9, 0}, 0}};
+    s.step = 40;
+  }
+};
+
+template <class T>
+std::vector<T> read(const std::filesystem::path& path, const char* group, const char* name) {
+  std::vector<T> list;
+  hdf5::File::open(path, H5F_ACC_RDONLY).open_group(group).read(name, list);
+  return list;
+}
+
+class Snapshot : public testing::Test {
+ protected:
+  std::filesystem::path path(const SnapshotInfo& info) const { return directory.path() / info.file; }
+  TemporaryDirectory directory;
+};
+
+TEST_F(Snapshot, ListsGrainsByTheirIds) {
+  const Bed bed;
+  const SnapshotInfo info = write_snapshot(directory.path(), "02-shear-000040", 1.5, bed.scene, bed.state);
+  EXPECT_EQ(info.file, "02-shear-000040.h5");
+  EXPECT_EQ(info.grains, 3);
+  EXPECT_EQ(info.contacts, 3);
+
+  const auto file = hdf5::File::open(path(info), H5F_ACC_RDONLY);
+  double time = 0;
+  std::int64_t step = 0;
+  file.get("time", time);
+  file.get("step", step);
+  EXPECT_EQ(time, 1.5);
+  EXPECT_EQ(step, 40);
+
+  EXPECT_EQ(read<dem::Index>(path(info), "grains", "id"), (std::vector<dem::Index>{0, 1, 2}));
+  EXPECT_EQ(read<double>(path(info), "grains", "radius"), (std::vector{0.5, 0.55, 0.6}));
+  EXPECT_EQ(read<dem::Role>(path(info), "grains", "role"),
+            (std::vector{dem::Role::bottom, dem::Role::free, dem::Role::top}));
+  const auto position = read<Vec3d>(path(info), "grains", "position");
+  EXPECT_EQ(position[0], (Vec3d{0.5, -0.1 + 3, 1}));
+  EXPECT_DOUBLE_EQ(position[2].x, 2.45);
+  const auto displacement = read<Vec3d>(path(info), "grains", "displacement");
+  EXPECT_DOUBLE_EQ(displacement[2].x, 6);
+  EXPECT_EQ(displacement[1], (Vec3d{0, 0, 0.5}));
+}
+
+TEST_F(Snapshot, ListsContactsByTheirIds) {
+  const Bed bed;
+  const SnapshotInfo info = write_snapshot(directory.path(), "a", 0, bed.scene, bed.state);
+  EXPECT_EQ(read<dem::Index>(path(info), "contacts", "i"), (std::vector<dem::Index>{0, 0, 1}));
+  EXPECT_EQ(read<dem::Index>(path(info), "contacts", "j"), (std::vector<dem::Index>{1, 2, 2}));
+  const auto f_n = read<Vec3d>(path(info), "contacts", "force_normal");
+  const auto f = read<Vec3d>(path(info), "contacts", "force");
+  EXPECT_LT(f_n[0].x, 0);  // 1 pushes 0 to the left
+  EXPECT_LT(f_n[2].x, 0);  // 2 pushes 1 to the left
+  EXPECT_NE(f[0].y, 0);
+  for (const Vec3d& point : read<Vec3d>(path(info), "contacts", "point")) {
+    EXPECT_TRUE(point.x >= 0 && point.x < 3 && point.y >= 0 && point.y < 3);
+  }
+}
+
+TEST_F(Snapshot, WrapsATinyNegativePositionToZero) {
+  Bed bed;
+  bed.state.x[1].x = -1e-20;
+  const SnapshotInfo info = write_snapshot(directory.path(), "a", 0, bed.scene, bed.state);
+  EXPECT_EQ(read<Vec3d>(path(info), "grains", "position")[0].x, 0);
+}
+
+TEST_F(Snapshot, HasUnitsEverywhere) {
+  const Bed bed;
+  const SnapshotInfo info = write_snapshot(directory.path(), "a", 0, bed.scene, bed.state);
+  const hid_t file = H5Fopen(path(info).c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  const auto expect_units = [&](const std::string& group, const std::vector<std::string>& names) {
+    H5G_info_t about{};
+    H5Gget_info_by_name(file, group.c_str(), &about, H5P_DEFAULT);
+    EXPECT_EQ(about.nlinks, names.size());
+    for (const std::string& name : names) {
+      EXPECT_GT(H5Aexists_by_name(file, (group + "/" + name).c_str(), "units", H5P_DEFAULT), 0) << name;
+    }
+  };
+  expect_units("grains", {"id", "role", "radius", "position", "displacement", "velocity", "spin", "rotation",
+                          "pressure"});
+  expect_units("contacts", {"id", "i", "j", "point", "force_normal", "force_tangential", "force", "overlap"});
+  H5Fclose(file);
+}
+
+TEST_F(Snapshot, HasTheSameBytesEachTime) {
+  const Bed bed;
+  const SnapshotInfo info = write_snapshot(directory.path(), "a", 0, bed.scene, bed.state);
+  const std::string before = contents(path(info));
+  write_snapshot(directory.path(), "a", 0, bed.scene, bed.state);
+  EXPECT_EQ(contents(path(info)), before);
+}
+
+// Also with a step, or all steps, without contacts.
+TEST_F(Snapshot, OpensInVtk) {
+  const auto script = std::filesystem::path(__FILE__).parent_path() / "open_xdmf.py";
+  const Bed bed;
+  Bed loose = bed;
+  loose.state.contacts.clear();
+  for (const auto& beds : {std::vector{bed, loose, bed}, std::vector{loose, bed}, std::vector{loose}}) {
+    std::vector<SnapshotInfo> snapshots;
+    for (const Bed& b : beds) {
+      const auto number = std::to_string(snapshots.size());
+      snapshots.push_back(write_snapshot(directory.path(), "02-shear-" + number,
+                                         0.1 * static_cast<double>(snapshots.size()), b.scene, b.state));
+    }
+    write_xdmf(directory.path(), snapshots);
+    const int status = std::system(("python3 " + script.string() + " " + directory.path().string()).c_str());
+    if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "python3 has no VTK that reads XDMF";
+    EXPECT_EQ(status, 0);
+  }
+  write_xdmf(directory.path(), {});
+  EXPECT_TRUE(contains(contents(directory.path() / "grains.xdmf"), "Temporal"));
+}
+
+}  // namespace
+}  // namespace moraine::output
