@@ -31,7 +31,6 @@ class OnEveryBackend : public testing::TestWithParam<BackendChoice> {
 #define ON_EVERY_BACKEND(Suite)                                                                                \
   INSTANTIATE_TEST_SUITE_P(, Suite,                                                                            \
                            testing::Values(moraine::BackendChoice{"cpu_1_thread", moraine::dem::Backend::cpu, 1},  \
-                                           moraine::BackendChoice{"cpu_2_threads", moraine::dem::Backend::cpu, 2}, \
                                            moraine::BackendChoice{"reference", moraine::dem::Backend::reference, 1}, \
                                            moraine::BackendChoice{"cuda", moraine::dem::Backend::cuda, 1}),        \
                            [](const auto& info) { return info.param.name; })

@@ -39,6 +39,7 @@ struct Stage {
   double shear_stress;  // Pa, for shear_stress
   double bottom_layer, top_layer;  // m, thickness by grain centres; negative: one largest diameter
   bool hold_layer_height;
+  double f;                           // eq. 9
   double gamma_n, gamma_t;            // N s/m, between grains
   double mu_s, mu_d;                  // between grains, in this stage
   double wall_gamma_n, wall_gamma_t;  // N s/m
@@ -68,7 +69,6 @@ struct Case {
   double wall_k_t;          // N/m
   double wall_mass;         // kg; 0: 0.001 of the mass of N spheres as wide as a lattice cell
   double gravity;           // m/s2
-  double f;                 // eq. 9
   double dt;                // s; 0: by eq. 9
   double neighbour_margin;  // m; 0: automatic
   bool ledger;

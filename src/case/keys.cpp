@@ -108,7 +108,7 @@ std::vector<Key> make_keys() {
       row<&C::wall_mass>("wall.mass", "kg", "0", ">= 0", "of the top wall; 0: 0.001 of the mass of N spheres as wide as a lattice cell"),
 
       row<&C::gravity>("model.gravity", "m/s2", "9.80665", ">= 0", "along -z"),
-      row<&C::f>("model.f", "1", "0.075", "> 0", "time step in units of sqrt(min m / max(k_n, k_t))"),
+      {"model.f", Type::number, "1", "0.075", "> 0", "time step in units of sqrt(min m / max(k_n, k_t)), eq. 9; a stage may have its own", "", set_nothing},
       row<&C::dt>("model.dt", "s", "0", ">= 0", "time step; 0: by f"),
       row<&C::neighbour_margin>("model.neighbour_margin", "m", "0", ">= 0", "of the neighbour list; 0: automatic; changes no result"),
       row<&C::ledger>("model.ledger", "", "true", "", "account for every joule"),
@@ -128,6 +128,7 @@ std::vector<Key> make_keys() {
       row<&S::bottom_layer>("stage.bottom_layer", "m", "-1", "", "thickness of the layer that stands still; negative: one largest diameter", sheared),
       row<&S::top_layer>("stage.top_layer", "m", "-1", "", "thickness of the driven layer; negative: one largest diameter", sheared),
       row<&S::hold_layer_height>("stage.hold_layer_height", "", "false", "", "the layers keep their height too", sheared),
+      row<&S::f>("stage.f", "1", "model.f", "> 0", "time step, as model.f"),
       row<&S::gamma_n>("stage.gamma_n", "N s/m", "contact.gamma_n", ">= 0", "normal viscosity"),
       row<&S::gamma_t>("stage.gamma_t", "N s/m", "contact.gamma_t", ">= 0", "tangential viscosity"),
       row<&S::mu_s>("stage.mu_s", "1", "contact.mu_s", ">= 0", "static friction"),

@@ -48,10 +48,10 @@ struct Spring {
 
 template <class T>
 struct Action {
-  Vec3<T> f;        // N, on i; j gets -f
-  Vec3<T> n_x_f;    // N, n x f_t: times -l gives the torque, on i and j alike
-  T slip;           // J, dissipated by sliding in this step
-  T viscous_power;  // W, dissipated by damping now
+  Vec3<T> f;      // N, on i; j gets -f
+  Vec3<T> n_x_f;  // N, n x f_t: times -l gives the torque, on i and j alike
+  T slip;         // J, dissipated by sliding in this step
+  Vec3<T> f_viscous, n_x_f_viscous;  // the part of both that damping contributes (with a ledger only)
 };
 
 template <class T>
@@ -77,10 +77,13 @@ struct Trial {
 
 template <class T>
 MORAINE_HD Trial<T> stretch(double dt, const Geometry<T>& g, const Motion<T>& before, const Vec3<T>& old) {
-  // The contact's displacement over the step, seen from the middle of it.
+  // The contact's displacement over the step, with normal and lever arms as they were in the middle of it: taken at its
+  // end they would make the work of the spring first order in dt.
+  const T v_n = dot(before.v, g.n);
   const T half_turn = T(0.5 * dt) * g.curvature;
-  const Vec3<T> n_mid = axpy(-half_turn, axpy(-dot(before.v, g.n), g.n, before.v), g.n);
-  const Vec3<T> spin = axpy(g.l_i, before.omega_i, g.l_j * before.omega_j);
+  const Vec3<T> n_mid = axpy(-half_turn, axpy(-v_n, g.n, before.v), g.n);
+  const T shortening = T(0.25 * dt) * v_n;
+  const Vec3<T> spin = axpy(g.l_i - shortening, before.omega_i, (g.l_j - shortening) * before.omega_j);
   const Vec3<T> v_c = before.v + cross(n_mid, spin);
   const Vec3<T> step = T(dt) * axpy(-dot(v_c, n_mid), n_mid, v_c);
 
@@ -100,23 +103,19 @@ MORAINE_HD Action<T> respond(const ContactParameters& p, const Geometry<T>& g, c
   const T zero(0);
   const auto touching = g.delta_n < zero;
   const T f_elastic = T(-p.k_n) * g.delta_n;
-  T f_n = f_elastic, v_n_now = zero;
-  if constexpr (F.viscous) {
-    v_n_now = dot(now.v, g.n);
-    f_n = max(fma(T(-p.gamma_n), v_n_now, f_n), zero);
-  }
+  T f_n = f_elastic;
+  if constexpr (F.viscous) f_n = max(fma(T(-p.gamma_n), dot(now.v, g.n), f_n), zero);
   f_n = select(touching, f_n, zero);
 
-  Action<T> a{f_n * g.n, {zero, zero, zero}, zero, zero};
-  if constexpr (F.viscous && F.ledger) a.viscous_power = select(touching, (f_elastic - f_n) * v_n_now, zero);
+  const Vec3<T> none{zero, zero, zero};
+  Action<T> a{f_n * g.n, none, zero, none, none};
+  if constexpr (F.viscous && F.ledger) a.f_viscous = select(touching, f_n - f_elastic, zero) * g.n;
   if constexpr (!F.friction) return a;
 
   Vec3<T> f_t = T(-p.k_t) * trial.delta_t;
-  Vec3<T> v_t_now{zero, zero, zero};
   if constexpr (F.viscous) {
     const Vec3<T> c = now.v + cross(g.n, axpy(g.l_i, now.omega_i, g.l_j * now.omega_j));
-    v_t_now = axpy(-dot(c, g.n), g.n, c);
-    f_t = axpy(T(-p.gamma_t), v_t_now, f_t);
+    f_t = axpy(T(-p.gamma_t), axpy(-dot(c, g.n), g.n, c), f_t);
   }
   T mu(p.mu_s);
   if constexpr (F.softening) mu = select(spring.slipping > zero, T(p.mu_d), mu);
@@ -141,7 +140,11 @@ MORAINE_HD Action<T> respond(const ContactParameters& p, const Geometry<T>& g, c
   if constexpr (F.ledger) {
     // Mean force times plastic displacement; a contact that opens gives up what its spring still held.
     a.slip = T(0.5 * p.k_t) * dot((trial.delta_t - trial.step) + kept, trial.delta_t - kept);
-    if constexpr (F.viscous) a.viscous_power = a.viscous_power - dot(axpy(T(p.k_t), kept, f_t), v_t_now);
+    if constexpr (F.viscous) {
+      const Vec3<T> f_t_viscous = axpy(T(p.k_t), kept, f_t);
+      a.f_viscous += f_t_viscous;
+      a.n_x_f_viscous = cross(g.n, f_t_viscous);
+    }
   }
   return a;
 }

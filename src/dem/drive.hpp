@@ -10,14 +10,17 @@ namespace moraine::dem {
 struct Reaction {
   double wall_force = 0;   // N, on the top wall, upwards
   double shear_force = 0;  // N, x force on the top layer
+  double wall_damping = 0;  // N, the viscous part of wall_force
 };
 struct Dissipation {
   double slip = 0;           // J, in the step
-  double viscous_power = 0;  // W
+  double damping_power = 0;  // W, of viscous forces on grains, at the velocities of the step
 };
 
 struct Drive {
-  double wall_z = 0, wall_v = 0, wall_dz = 0;  // dz: of the last step
+  double wall_z = 0, wall_v = 0;         // m, m/s; v at n - 1/2
+  double wall_dz = 0, wall_v_now = 0;    // m, of the last step; m/s, at n
+  double wall_v_ahead = 0;               // m/s, at n as foreseen before its forces are known (viscous contacts)
   double layer_u = 0, layer_mass = 0;
   Reaction at, before;                 // at the present step and one earlier
   double sigma = 0, sigma_before = 0;  // Pa, asked of the wall
@@ -36,21 +39,27 @@ struct Drive {
       ledger.layers -= 0.5 * (before.shear_force + at.shear_force) * layer_u * s.dt;
     if (s.shear.drive == Shear::Drive::stress) ledger.layers += s.shear.stress * area * layer_u * s.dt;
   }
+  // To be called after close, for the same step.
   MORAINE_HD void account(const Scene& s, const Dissipation& d) {
+    const double power = viscous_power(d);
     ledger.slip += d.slip;
-    ledger.viscous += 0.5 * (ledger.viscous_power + d.viscous_power) * s.dt;
-    ledger.viscous_power = d.viscous_power;
+    ledger.viscous += 0.5 * (ledger.viscous_power + power) * s.dt;
+    ledger.viscous_power = power;
   }
+  MORAINE_HD double viscous_power(const Dissipation& d) const { return -d.damping_power - at.wall_damping * wall_v_now; }
   MORAINE_HD void take(const Scene& s, const Reaction& reaction) {
     at = reaction;
     sigma = s.normal_stress(static_cast<double>(step) * s.dt);
+    wall_v_now = fma(wall_acceleration(s), 0.5 * s.dt, wall_v);
   }
 
   // Wall and layer from step n to n + 1 (velocities from n - 1/2 to n + 1/2).
   MORAINE_HD void advance(const Scene& s) {
     before = at;
     sigma_before = sigma;
-    wall_v = fma(wall_acceleration(s), s.dt, wall_v);
+    const double acceleration = wall_acceleration(s);
+    wall_v = fma(acceleration, s.dt, wall_v);
+    wall_v_ahead = fma(acceleration, 0.5 * s.dt, wall_v);
     wall_dz = wall_v * s.dt;
     wall_z += wall_dz;
     layer_u = fma(layer_acceleration(s), s.dt, layer_u);

@@ -53,7 +53,8 @@ Drive drive_of(const Scene& scene, const State& s) {
     if (s.role[i] == Role::top) d.layer_mass += sphere_mass(scene.density, s.r[i]);
   d.step = s.step;
   d.ledger = s.ledger;
-  d.take(scene, {s.wall_force, s.shear_force});
+  d.take(scene, {s.wall_force, s.shear_force, 0});
+  d.wall_v_ahead = s.staggered ? d.wall_v_now : d.wall_v;
   return d;
 }
 

@@ -20,17 +20,28 @@ std::vector<GrainRow> grain_rows(const Scene& scene, const State& state);
 
 Drive drive_of(const Scene& scene, const State& state);
 
-// A wall's action on a grain; n_x_f is the torque on it already.
+// A wall's action on a grain.
+struct WallAction {
+  Vec3d f, torque;
+  double slip;
+  Vec3d f_viscous, torque_viscous;
+};
 template <Features F>
-MORAINE_HD Action<double> wall_action(const ContactParameters& law, double dt, const Drive& drive, const GrainRow& grain,
+MORAINE_HD WallAction wall_action(const ContactParameters& law, double dt, const Drive& drive, const GrainRow& grain,
                                       const NowRow& now, WallName wall, Spring<double>& spring) {
   const bool top = wall == WallName::top;
   const Geometry<double> g = at_wall(grain.x.z, grain.r, top ? drive.wall_z : 0.0, top ? -1.0 : 1.0);
-  const Vec3d wall_v{0, 0, top ? drive.wall_v : 0.0}, still{0, 0, 0};
-  Action<double> a = contact_law<F>(law, dt, g, {grain.v - wall_v, grain.omega, still},
-                                    {now.v - wall_v, now.omega, still}, spring);
-  a.n_x_f = -g.l_i * a.n_x_f;
-  return a;
+  const Vec3d still{0, 0, 0}, wall_v{0, 0, top ? drive.wall_v : 0.0}, wall_now{0, 0, top ? drive.wall_v_ahead : 0.0};
+  const Action<double> a = contact_law<F>(law, dt, g, {grain.v - wall_v, grain.omega, still},
+                                          {now.v - wall_now, now.omega, still}, spring);
+  return {a.f, -g.l_i * a.n_x_f, a.slip, a.f_viscous, -g.l_i * a.n_x_f_viscous};
+}
+
+// The forces of viscous contacts on a grain do this much work at step n, when its velocity is half a step further.
+MORAINE_HD void add_damping_power(Power& power, const GrainRow& g, const Mobility& m, const LoadRow& load,
+                                  const LoadRow& damping, double dt) {
+  power.add(damping, axpy(0.5 * dt, m.acceleration(load.f), g.v),
+            axpy(0.5 * dt, m.spin_acceleration(load.torque), g.omega));
 }
 
 // A grain that is no longer finite, or outside what bounds it.

@@ -28,8 +28,8 @@ struct GatherView {
   double margin;
   GrainRow* grain;
   NowRow* now;
-  LoadRow* load;
-  double* wall_push;  // N, each grain's force on the top wall
+  LoadRow *load, *damping;  // damping: the viscous part, where the ledger asks for it
+  double *wall_push, *wall_damping;  // N, each grain's force on the top wall; its viscous part
   Vec3d* rotation;
   const Mobility* mobility;
   const Role* role;
@@ -49,16 +49,20 @@ namespace gather {
 
 struct SumChunk {
   GatherView w;
+  double dt;
   MORAINE_HD void operator()(std::int64_t c) const {
     if (w.control->stale) return;
     Reaction reaction;
     Dissipation dissipation;
+    Power power;
     for (Index i = static_cast<Index>(c) * w.chunk; i < w.chunk_end(static_cast<Index>(c)); ++i) {
       reaction.wall_force += w.wall_push[i];
+      reaction.wall_damping += w.wall_damping[i];
       if (w.role[i] == Role::top) reaction.shear_force += w.load[i].f.x;
       dissipation.slip += w.load[i].slip;
-      dissipation.viscous_power += w.load[i].viscous_power;
+      if (w.damping) add_damping_power(power, w.grain[i], w.mobility[i], w.load[i], w.damping[i], dt);
     }
+    dissipation.damping_power = power.total();
     w.reaction[c] = reaction, w.dissipation[c] = dissipation;
   }
 };
@@ -75,12 +79,16 @@ struct AdvanceDrive {
   MORAINE_HD void close(Drive& drive) const {
     Reaction reaction;
     Dissipation dissipation;
-    for (Index k = 0; k < w.chunks(); ++k) {
-      reaction.wall_force += w.reaction[k].wall_force, reaction.shear_force += w.reaction[k].shear_force;
-      dissipation.slip += w.dissipation[k].slip, dissipation.viscous_power += w.dissipation[k].viscous_power;
-    }
+    sum(reaction, dissipation);
     drive.close(w.scene, reaction);
     if (w.scene.ledger) drive.account(w.scene, dissipation);
+  }
+  MORAINE_HD void sum(Reaction& reaction, Dissipation& dissipation) const {
+    for (Index k = 0; k < w.chunks(); ++k) {
+      reaction.wall_force += w.reaction[k].wall_force, reaction.shear_force += w.reaction[k].shear_force;
+      reaction.wall_damping += w.reaction[k].wall_damping;
+      dissipation.slip += w.dissipation[k].slip, dissipation.damping_power += w.dissipation[k].damping_power;
+    }
   }
 };
 
@@ -136,7 +144,7 @@ struct Forces {
   MORAINE_HD void operator()(std::int64_t index) const {
     if (w.control->stale) return;
     const auto i = static_cast<Index>(index);
-    LoadRow sum{};
+    LoadRow sum{}, damping{};
     for (std::int64_t k = w.row[i]; k < w.row[i + 1]; ++k) {
       const Index j = w.neighbour[k];
       const bool first = i < j;
@@ -149,31 +157,29 @@ struct Forces {
         at = {p.v - q.v, p.omega, q.omega};
       }
       const Action<double> action = contact_law<F>(w.scene.grain, dt, g, before, at, w.spring[k]);
-      if (first) {
-        sum.f += action.f;
-        sum.torque += -g.l_i * action.n_x_f;
-        sum.slip += action.slip;
-        sum.viscous_power += action.viscous_power;
-      } else {
-        sum.f -= action.f;
-        sum.torque += -g.l_j * action.n_x_f;
-      }
+      const auto share = [&](const Vec3d& f, const Vec3d& n_x_f, double slip, LoadRow& to) {
+        if (first)
+          to.add(f, -g.l_i * n_x_f, slip);
+        else
+          to.add(-f, -g.l_j * n_x_f, 0);
+      };
+      share(action.f, action.n_x_f, action.slip, sum);
+      if constexpr (F.viscous && F.ledger) share(action.f_viscous, action.n_x_f_viscous, 0, damping);
     }
-    w.wall_push[i] = 0;
-    if (w.scene.floor) add_wall(i, WallName::floor, sum);
-    if (w.scene.top_wall.drive != TopWall::Drive::none) add_wall(i, WallName::top, sum);
+    w.wall_push[i] = w.wall_damping[i] = 0;
+    if (w.scene.floor) add_wall(i, WallName::floor, sum, damping);
+    if (w.scene.top_wall.drive != TopWall::Drive::none) add_wall(i, WallName::top, sum, damping);
     w.load[i] = sum;
+    if constexpr (F.viscous && F.ledger) w.damping[i] = damping;
   }
 
-  MORAINE_HD void add_wall(Index i, WallName wall, LoadRow& sum) const {
+  MORAINE_HD void add_wall(Index i, WallName wall, LoadRow& sum, LoadRow& damping) const {
     const NowRow now = F.viscous ? w.now[i] : NowRow{};
-    const Action<double> a = wall_action<F>(w.scene.wall, dt, w.control->drive, w.grain[i], now, wall,
-                                            w.wall_spring[2 * i + static_cast<int>(wall)]);
-    sum.f += a.f;
-    sum.slip += a.slip;
-    sum.torque += a.n_x_f;
-    sum.viscous_power += a.viscous_power;
-    if (wall == WallName::top) w.wall_push[i] = -a.f.z;
+    const WallAction a = wall_action<F>(w.scene.wall, dt, w.control->drive, w.grain[i], now, wall,
+                                        w.wall_spring[2 * i + static_cast<int>(wall)]);
+    sum.add(a.f, a.torque, a.slip);
+    if constexpr (F.viscous && F.ledger) damping.add(a.f_viscous, a.torque_viscous, 0);
+    if (wall == WallName::top) w.wall_push[i] = -a.f.z, w.wall_damping[i] = -a.f_viscous.z;
   }
 };
 
@@ -230,6 +236,8 @@ class GatherEngine final : public Engine {
     }
     load_.set(loads), mobility_.set(mobilities);
     now_.resize(features_.viscous ? n_ : 0), wall_push_.set(std::vector<double>(n_, 0));
+    wall_damping_.set(std::vector<double>(n_, 0));
+    damping_.set(std::vector<LoadRow>(features_.viscous && features_.ledger ? n_ : 0));
     std::vector<Spring<double>> wall_springs(2 * static_cast<std::size_t>(n_), {{0, 0, 0}, 0});
     for (const WallContact& w : s.wall_contacts)
       wall_springs[2 * static_cast<std::size_t>(w.i) + static_cast<int>(w.wall)] = {w.delta_t, w.slipping};
@@ -280,12 +288,10 @@ class GatherEngine final : public Engine {
     const std::vector<LoadRow> loads = load_.get();
     const std::vector<Vec3d> rotation = rotation_.get();
     if (!control.closed) {
-      space_.for_each(view_.chunks(), gather::SumChunk{view_});
-      GatherView host = view_;
-      std::vector<Reaction> reaction = reaction_.get();
-      std::vector<Dissipation> dissipation = dissipation_.get();
-      host.reaction = reaction.data(), host.dissipation = dissipation.data();
-      gather::AdvanceDrive{host}.close(control.drive);
+      space_.for_each(view_.chunks(), gather::SumChunk{view_, view_.scene.dt});
+      std::vector<Reaction> reactions = reaction_.get();
+      std::vector<Dissipation> dissipations = dissipation_.get();
+      on_host(reactions, dissipations).close(control.drive);
     }
     for (Index i = 0; i < n_; ++i) append_grain(s, grains[i], rotation[i], loads[i], role_host_[i]);
 
@@ -312,7 +318,9 @@ class GatherEngine final : public Engine {
  private:
   void refresh_view() {
     view_.grain = grain_.data(), view_.now = now_.data(), view_.load = load_.data();
-    view_.wall_push = wall_push_.data(), view_.rotation = rotation_.data(), view_.mobility = mobility_.data();
+    view_.damping = damping_.size() > 0 ? damping_.data() : nullptr;
+    view_.wall_push = wall_push_.data(), view_.wall_damping = wall_damping_.data();
+    view_.rotation = rotation_.data(), view_.mobility = mobility_.data();
     view_.role = role_.data(), view_.row = lists_.row.data(), view_.neighbour = lists_.neighbour.data();
     view_.spring = spring_.data(), view_.wall_spring = wall_spring_.data(), view_.reaction = reaction_.data();
     view_.dissipation = dissipation_.data(), view_.fastest2 = fastest2_.data(), view_.control = control_.data();
@@ -345,28 +353,38 @@ class GatherEngine final : public Engine {
   }
 
   void start_half_a_step_back() {
-    space_.for_each(view_.chunks(), gather::SumChunk{view_});
+    space_.for_each(view_.chunks(), gather::SumChunk{view_, 0});
     Control control = space_.read(control_.data());
+    std::vector<Reaction> reactions = reaction_.get();
+    std::vector<Dissipation> dissipations = dissipation_.get();
     Reaction reaction;
-    for (const Reaction& r : reaction_.get())
-      reaction.wall_force += r.wall_force, reaction.shear_force += r.shear_force;
-    control.drive.ledger = {};
-    control.drive.take(view_.scene, reaction);
+    Dissipation dissipation;
+    on_host(reactions, dissipations).sum(reaction, dissipation);
+    Drive& drive = control.drive;
+    drive.take(view_.scene, reaction);
+    drive.half_step(view_.scene, -1);
+    drive.take(view_.scene, reaction);  // now that the wall's velocity is that of n - 1/2
+    drive.ledger = {};
+    drive.ledger.viscous_power = drive.viscous_power(dissipation);
     std::vector<GrainRow> grains = grain_.get();
     std::vector<LoadRow> loads = load_.get();
     for (Index i = 0; i < n_; ++i) {
-      control.drive.ledger.viscous_power += loads[i].viscous_power;
       half_step_back(grains[i], mobility(view_.scene, grains[i].r, role_host_[i]), loads[i].f, loads[i].torque,
                      view_.scene.dt);
-      loads[i].slip = loads[i].viscous_power = 0;
+      loads[i].slip = 0;
     }
-    control.drive.half_step(view_.scene, -1);
     grain_.set(grains), load_.set(loads), control_.set({control});
+  }
+
+  gather::AdvanceDrive on_host(std::vector<Reaction>& reactions, std::vector<Dissipation>& dissipations) const {
+    GatherView host = view_;
+    host.reaction = reactions.data(), host.dissipation = dissipations.data();
+    return {host};
   }
 
   void one_step() {
     with_features(features_, [&]<Features F>() {
-      space_.for_each(view_.chunks(), gather::SumChunk{view_});
+      space_.for_each(view_.chunks(), gather::SumChunk{view_, view_.scene.dt});
       space_.for_each(1, gather::AdvanceDrive{view_});
       space_.for_each(n_, gather::Integrate<F>{view_});
       space_.for_each(view_.chunks(), gather::FastestInChunk{view_});
@@ -397,8 +415,8 @@ class GatherEngine final : public Engine {
   Neighbours<Space> lists_, old_lists_;
   Array<GrainRow> grain_;
   Array<NowRow> now_;
-  Array<LoadRow> load_;
-  Array<double> wall_push_, fastest2_;
+  Array<LoadRow> load_, damping_;
+  Array<double> wall_push_, wall_damping_, fastest2_;
   Array<Vec3d> rotation_;
   Array<Mobility> mobility_;
   Array<Role> role_;

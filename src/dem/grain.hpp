@@ -30,7 +30,20 @@ struct alignas(32) LoadRow {
   Vec3d f;
   double slip;  // J, of the contacts in which the grain is i
   Vec3d torque;
-  double viscous_power;  // W, likewise
+  double unused;
+
+  MORAINE_HD void add(const Vec3d& force, const Vec3d& moment, double slipped) {
+    f += force, torque += moment, slip += slipped;
+  }
+};
+
+// W, what forces do to moving grains, component by component so that SIMD rows and single grains agree to the last bit.
+struct Power {
+  Vec3d sum{0, 0, 0};
+  MORAINE_HD void add(const LoadRow& load, const Vec3d& v, const Vec3d& omega) {
+    for (int a = 0; a < 3; ++a) sum[a] = fma(load.torque[a], omega[a], fma(load.f[a], v[a], sum[a]));
+  }
+  MORAINE_HD double total() const { return sum.x + (sum.y + sum.z); }
 };
 
 // Grains are dealt into chunks of neighbours in memory order: the unit of work of a thread and of every sum. Their number

@@ -43,7 +43,7 @@ std::vector<WallForce> wall_forces(const Scene& scene, const State& s, const Vel
   for (const WallContact& w : s.wall_contacts) {
     const GrainRow g = grain_at(s, w.i, at.v, at.omega);
     Spring<double> spring{w.delta_t, w.slipping};
-    const Action<double> a =
+    const WallAction a =
         wall_action<all_features>(scene.wall, 0, drive, g, {g.v, 0, g.omega, 0}, w.wall, spring);
     const bool top = w.wall == WallName::top;
     out.push_back({w.i, w.wall, std::abs(a.f.z), a.f,

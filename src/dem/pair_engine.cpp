@@ -98,6 +98,8 @@ void PairEngine::load(const Scene& scene, const State& s) {
   grain_.resize(rows), load_.resize(rows), rotation_.resize(n_), mobility_.resize(n_), role_.resize(n_);
   const Features features = features_of(scene);
   now_.resize(features.viscous ? rows : 0);
+  damping_.resize(features.viscous && features.ledger ? rows : 0);
+  std::fill(damping_.data(), damping_.data() + damping_.size(), LoadRow{});
 
   const std::vector<GrainRow> grains = grain_rows(scene, s);
   std::copy(grains.begin(), grains.end(), grain_.data());
@@ -139,15 +141,16 @@ void PairEngine::load(const Scene& scene, const State& s) {
     for (Index i = 0; i < n_; ++i) now_.data()[i] = {grain_.data()[i].v, 0, grain_.data()[i].omega, 0};
   (this->*evaluate_)(0.0);
   Drive& drive = course_.drive;
-  drive.ledger = {};
   drive.take(scene, sum_reactions());
+  drive.half_step(scene, -1);
+  drive.take(scene, sum_reactions());  // now that the wall's velocity is that of n - 1/2
+  drive.ledger = {};
+  drive.ledger.viscous_power = drive.viscous_power(pending_dissipation(0));
   for (Index i = 0; i < n_; ++i) {
     LoadRow& l = load_.data()[i];
-    drive.ledger.viscous_power += l.viscous_power;
     half_step_back(grain_.data()[i], mobility_.data()[i], l.f, l.torque, scene.dt);
-    l.slip = l.viscous_power = 0;
+    l.slip = 0;
   }
-  drive.half_step(scene, -1);
 }
 
 template <Features F>
@@ -196,13 +199,16 @@ void PairEngine::find_candidates() {
     slots += link.size;
   }
   if (rows + slots > std::numeric_limits<Index>::max()) throw error("too many contacts for 32-bit indices: ", slots);
-  if (rows + slots > load_.size()) {  // keep the loads of grains and dummies
-    Host::Array<LoadRow> larger;
-    larger.resize(rows + slots);
-    std::copy(load_.data(), load_.data() + rows, larger.data());
-    load_ = std::move(larger);
+  for (Host::Array<LoadRow>* loads : {&load_, &damping_}) {
+    if (loads->size() == 0) continue;
+    if (rows + slots > loads->size()) {  // keep what grains and dummies have
+      Host::Array<LoadRow> larger;
+      larger.resize(rows + slots);
+      std::copy(loads->data(), loads->data() + rows, larger.data());
+      *loads = std::move(larger);
+    }
+    std::fill(loads->data() + rows, loads->data() + rows + slots, LoadRow{});
   }
-  std::fill(load_.data() + rows, load_.data() + rows + slots, LoadRow{});
   slot_owner_.resize(slots);
 
   course_.moved = course_.moved_near = 0;
@@ -232,6 +238,7 @@ Reaction PairEngine::sum_reactions() const {
   for (const Chunk& chunk : chunks_) {
     sum.wall_force += chunk.reaction.wall_force;
     sum.shear_force += chunk.reaction.shear_force;
+    sum.wall_damping += chunk.reaction.wall_damping;
   }
   return sum;
 }
@@ -240,7 +247,23 @@ Dissipation PairEngine::sum_dissipation() const {
   Dissipation sum;
   for (const Chunk& chunk : chunks_) {
     sum.slip += chunk.dissipation.slip;
-    sum.viscous_power += chunk.dissipation.viscous_power;
+    sum.damping_power += chunk.dissipation.damping_power;
+  }
+  return sum;
+}
+
+// Of the present step, which integrate will add up only when it comes to it; the same sums in the same order.
+Dissipation PairEngine::pending_dissipation(double dt) const {
+  Dissipation sum;
+  for (const Chunk& chunk : chunks_) {
+    double slip = 0;
+    Power power;
+    for (Index i = chunk.begin; i < chunk.end; ++i) {
+      slip += load_.data()[i].slip;
+      if (damping_.size() > 0)
+        add_damping_power(power, grain_.data()[i], mobility_.data()[i], load_.data()[i], damping_.data()[i], dt);
+    }
+    sum.slip += slip, sum.damping_power += power.total();
   }
   return sum;
 }
@@ -376,35 +399,35 @@ void PairEngine::pair_forces(PairList& list, double dt) {
     for (int g = 0; g < block; ++g) {
       const PairGroup& p = list.pairs[start + g];
       const Action<Pack>& action = actions[g];
-      Pack f[4] = {action.f.x, action.f.y, action.f.z, F.ledger ? action.slip : Pack(0.0)};
-      transpose(f[0], f[1], f[2], f[3]);
-      [[maybe_unused]] Pack ti[4], tj[4];
-      if constexpr (F.friction) {
-        const Vec3<Pack> on_i = -geometry[g].l_i * action.n_x_f, on_j = -geometry[g].l_j * action.n_x_f;
-        ti[0] = on_i.x, ti[1] = on_i.y, ti[2] = on_i.z, ti[3] = F.viscous && F.ledger ? action.viscous_power : Pack(0.0);
-        tj[0] = on_j.x, tj[1] = on_j.y, tj[2] = on_j.z, tj[3] = 0.0;
-        transpose(ti[0], ti[1], ti[2], ti[3]);
-        transpose(tj[0], tj[1], tj[2], tj[3]);
-      }
-      for (int k = 0; k < 4; ++k) {
-        LoadRow &a = load[p.i[k]], &b = load[p.target[k]];
-        set_row(a.f, row(a.f) + f[k]);
-        set_row(b.f, row(b.f) - without_last(f[k]));
+      const auto scatter = [&](LoadRow* to, const Vec3<Pack>& force, const Vec3<Pack>& n_x_f, const Pack& slip) {
+        Pack f[4] = {force.x, force.y, force.z, slip};
+        transpose(f[0], f[1], f[2], f[3]);
+        [[maybe_unused]] Pack ti[4], tj[4];
         if constexpr (F.friction) {
-          set_row(a.torque, row(a.torque) + ti[k]);
-          set_row(b.torque, row(b.torque) + tj[k]);
-        } else if constexpr (F.viscous && F.ledger) {
-          a.viscous_power += action.viscous_power[k];
+          const Vec3<Pack> on_i = -geometry[g].l_i * n_x_f, on_j = -geometry[g].l_j * n_x_f;
+          ti[0] = on_i.x, ti[1] = on_i.y, ti[2] = on_i.z, ti[3] = 0.0;
+          tj[0] = on_j.x, tj[1] = on_j.y, tj[2] = on_j.z, tj[3] = 0.0;
+          transpose(ti[0], ti[1], ti[2], ti[3]);
+          transpose(tj[0], tj[1], tj[2], tj[3]);
         }
-      }
+        for (int k = 0; k < 4; ++k) {
+          LoadRow &a = to[p.i[k]], &b = to[p.target[k]];
+          set_row(a.f, row(a.f) + f[k]);
+          set_row(b.f, row(b.f) - without_last(f[k]));
+          if constexpr (F.friction) {
+            set_row(a.torque, row(a.torque) + ti[k]);
+            set_row(b.torque, row(b.torque) + tj[k]);
+          }
+        }
+      };
+      scatter(load, action.f, action.n_x_f, F.ledger ? action.slip : Pack(0.0));
+      if constexpr (F.viscous && F.ledger) scatter(damping_.data(), action.f_viscous, action.n_x_f_viscous, 0.0);
     }
   }
 }
 
-// What the pairs of other chunks and the walls add, and the chunk's part of the totals.
-template <Features F>
-void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt) {
-  LoadRow* const load = load_.data();
+// What the pairs of other chunks have left in slots for this one.
+void PairEngine::collect(const Chunk& chunk, LoadRow* load) const {
   const Index first_slot = n_ + 2 * static_cast<Index>(chunks_.size());
   for (const Index l : chunk.incoming) {
     const Link& link = links_[l];
@@ -415,18 +438,26 @@ void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt) {
       load[slot] = {};
     }
   }
+}
+
+// What the pairs of other chunks and the walls add, and the chunk's part of the reactions.
+template <Features F>
+void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt) {
+  LoadRow* const load = load_.data();
+  collect(chunk, load);
+  if constexpr (F.viscous && F.ledger) collect(chunk, damping_.data());
 
   chunk.reaction = {};
   for (WallPair& w : chunk.walls) {
     const GrainRow& g = grain_.data()[w.i];
     const NowRow now = F.viscous ? now_.data()[w.i] : NowRow{};
-    const Action<double> a = wall_action<F>(scene_.wall, dt, drive, g, now, w.wall, w.spring);
-    LoadRow& to = load[w.i];
-    to.f += a.f;
-    to.slip += a.slip;
-    to.torque += a.n_x_f;
-    to.viscous_power += a.viscous_power;
-    if (w.wall == WallName::top) chunk.reaction.wall_force -= a.f.z;
+    const WallAction a = wall_action<F>(scene_.wall, dt, drive, g, now, w.wall, w.spring);
+    load[w.i].add(a.f, a.torque, a.slip);
+    if constexpr (F.viscous && F.ledger) damping_.data()[w.i].add(a.f_viscous, a.torque_viscous, 0);
+    if (w.wall == WallName::top) {
+      chunk.reaction.wall_force -= a.f.z;
+      chunk.reaction.wall_damping -= a.f_viscous.z;
+    }
   }
   for (const Index i : chunk.top_layer) chunk.reaction.shear_force += load[i].f.x;
 }
@@ -437,7 +468,7 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive) {
   if (scene_.shear.drive == Shear::Drive::stress)
     for (const Index i : chunk.top_layer) grain[i].v.x = drive.layer_u;
   const Pack zero(0.0), dt(scene_.dt, scene_.dt, scene_.dt, 0), half_dt = Pack(0.5) * dt;
-  Pack sum_f = zero, sum_t = zero, fastest2 = zero;
+  Pack sum_f = zero, power = zero, fastest2 = zero;
   for (Index i = chunk.begin; i < chunk.end; ++i) {
     const Pack m = row(mobility_.data()[i]);
     const Pack inverse_mass = __builtin_shuffle(m.v, zero.v, Pack::Bits{0, 0, 1, 4});
@@ -446,6 +477,12 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive) {
     LoadRow& load = load_.data()[i];
     const Pack f = row(load.f), torque = row(load.torque);
     const Pack acceleration = fma(f, inverse_mass, gravity), spin_acceleration = torque * inverse_inertia;
+    if constexpr (F.viscous && F.ledger) {  // as Power::add, at the velocities of step n
+      LoadRow& damping = damping_.data()[i];
+      power = fma(row(damping.f), fma(half_dt, acceleration, row(grain[i].v)), power);
+      power = fma(row(damping.torque), fma(half_dt, spin_acceleration, row(grain[i].omega)), power);
+      damping = {};
+    }
     Kinematics<Pack> k{row(grain[i].x), row(grain[i].v), row(grain[i].omega), rotation_.data()[i]};
     leapfrog(k, acceleration, spin_acceleration, dt);
     set_row(grain[i].x, k.x), set_row(grain[i].v, k.v), set_row(grain[i].omega, k.omega);
@@ -454,11 +491,11 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive) {
       set_row(now_.data()[i].v, fma(half_dt, acceleration, k.v));
       set_row(now_.data()[i].omega, fma(half_dt, spin_acceleration, k.omega));
     }
-    sum_f += f, sum_t += torque;
+    sum_f += f;
     fastest2 = max(k.v * k.v, fastest2);
     set_row(load.f, zero), set_row(load.torque, zero);
   }
-  chunk.dissipation = {sum_f[3], sum_t[3]};
+  chunk.dissipation = {sum_f[3], power[0] + (power[1] + power[2])};
   for (int a = 0; a < 3; ++a) chunk.fastest2[a] = fastest2[a];
 }
 
@@ -478,6 +515,7 @@ void PairEngine::report_lost() const {
 template <Features F>
 void PairEngine::evaluate(double dt) {
   for (Index i = 0; i < n_; ++i) load_.data()[i] = {};
+  for (Index i = 0; i < n_ && damping_.size() > 0; ++i) damping_.data()[i] = {};
   for (Chunk& chunk : chunks_) pair_forces<F>(chunk, dt);
   for (Chunk& chunk : chunks_) finish<F>(chunk, course_.drive, dt);
 }
@@ -570,16 +608,7 @@ State PairEngine::state() const {
   Drive drive = course_.drive;
   if (!closed_) {
     drive.close(scene_, sum_reactions());
-    Dissipation sum;
-    for (const Chunk& chunk : chunks_) {
-      Dissipation part;
-      for (Index i = chunk.begin; i < chunk.end; ++i) {
-        part.slip += load_.data()[i].slip;
-        part.viscous_power += load_.data()[i].viscous_power;
-      }
-      sum.slip += part.slip, sum.viscous_power += part.viscous_power;
-    }
-    if (scene_.ledger) drive.account(scene_, sum);
+    if (scene_.ledger) drive.account(scene_, pending_dissipation(scene_.dt));
   }
   for (Index i = 0; i < n_; ++i) {
     const Pack& rotation = rotation_.data()[i];

@@ -88,6 +88,7 @@ class PairEngine final : public Engine {
   double fastest(const Drive& drive) const;
   Reaction sum_reactions() const;
   Dissipation sum_dissipation() const;
+  Dissipation pending_dissipation(double dt) const;
 
   template <Features F>
   Pause run(std::int64_t& steps, bool& at_forces);
@@ -97,6 +98,7 @@ class PairEngine final : public Engine {
   void pair_forces(Chunk& chunk, double dt);
   template <Features F>
   void pair_forces(PairList& list, double dt);
+  void collect(const Chunk& chunk, LoadRow* load) const;
   template <Features F>
   void finish(Chunk& chunk, const Drive& drive, double dt);
   template <Features F>
@@ -122,6 +124,7 @@ class PairEngine final : public Engine {
   Host::Array<GrainRow> grain_;  // n grains, then two dummies for each chunk
   Host::Array<NowRow> now_;      // viscous only
   Host::Array<LoadRow> load_;    // n grains, dummies, slots
+  Host::Array<LoadRow> damping_;  // the viscous part of it, where the ledger asks for it
   Host::Array<Pack> rotation_;
   Host::Array<Mobility> mobility_;
   Host::Array<Role> role_;

@@ -57,6 +57,7 @@ void write_grains(const hdf5::Group& grains, const dem::Scene& scene, const dem:
   grains.write("velocity", arrange(dem::velocity(scene, state), rows), "m/s");
   grains.write("spin", arrange(state.omega, rows), "rad/s");
   grains.write("rotation", arrange(state.rotation, rows), "rad");
+  grains.write("force", arrange(state.force, rows), "N");  // by contacts; without gravity
   grains.write("pressure", arrange(dem::grain_pressure(scene, state), rows), "Pa");
 }
 
@@ -116,6 +117,7 @@ const Cloud clouds[] = {
       {"velocity", real, 3},
       {"spin", real, 3},
       {"rotation", real, 3},
+      {"force", real, 3},
       {"pressure", real}},
      &SnapshotInfo::grains},
     {"contacts",

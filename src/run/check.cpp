@@ -43,7 +43,6 @@ void check_case(const Options& options) {
   std::printf("%s\n", c.title.empty() ? c.directory.string().c_str() : c.title.c_str());
   std::printf("  grains        %.0f, mean diameter %.4g m, box %.4g x %.4g m, bed about %.3g m (porosity 0.4)\n", n, diameter,
               start.box_x, start.box_y, settled);
-  std::printf("  backend       %s\n", engine->describe().c_str());
   // Records, rotation, mobility, some 3.5 candidates and near pairs a grain with springs, and the state kept for output.
   std::printf("  memory        about %.0f MB\n", n * 2200 / 1e6 + 20);
 
@@ -53,7 +52,10 @@ void check_case(const Options& options) {
     dem::State s = start.state;
     Stage stage = prepare(c, k, start, s);
     const dem::Scene& scene = stage.scene;
-    if (k == 0) ms = time_a_step(*engine, scene, s);
+    if (k == 0) {
+      ms = time_a_step(*engine, scene, s);
+      std::printf("  backend       %s\n", engine->describe().c_str());
+    }
     // Before the bed has settled its height is not known: from the volume of the grains.
     const double height = c.start.empty() ? settled : stage.height_0;
     double strain_rate = wanted.strain_rate != 0 ? wanted.strain_rate : scene.shear.velocity / height;

@@ -76,24 +76,29 @@ std::string summary(const std::vector<cases::Stage>& stages, const std::vector<o
   std::string out =
       "stage         end time  height  porosity  contacts/  friction  friction  friction  dilation  ledger    residue/\n"
       "              s         m       1         grain      peak      (smooth)  ultimate  diameters residue J energy in\n";
+  double all_in = 0, all_residue = 0;
   for (std::size_t k = 0; k < stages.size(); ++k) {
     std::vector<output::Row> own;
     for (const output::Row& r : rows)
       if (r.stage == static_cast<double>(k)) own.push_back(r);
     if (own.empty()) continue;
     const output::Row& last = own.back();
-    char text[256], friction[64];
-    const Strength s = strength_of(own);
-    if (shears(stages[k].kind))
-      std::snprintf(friction, sizeof friction, "%-10.3f%-10.3f%-10.3f", s.peak, s.smoothed_peak, s.ultimate);
-    else
-      std::snprintf(friction, sizeof friction, "%-30s", "-");
+    char text[256], strength[64] = "-         -         -         -         ";
+    if (shears(stages[k].kind)) {
+      const Strength s = strength_of(own);
+      std::snprintf(strength, sizeof strength, "%-10.3f%-10.3f%-10.3f%-+10.3f", s.peak, s.smoothed_peak, s.ultimate,
+                    s.dilation_diameters);
+    }
     const double in = energy_put_in(own);
-    std::snprintf(text, sizeof text, "%-14s%-10.4g%-8.4f%-10.4f%-11.3f%s%-+10.3f%-10.1e%.1e\n", stages[k].name.c_str(),
-                  last.time, last.height, last.porosity, last.coordination, friction, s.dilation_diameters,
-                  last.residue, in > 0 ? std::abs(last.residue) / in : 0.0);
+    std::snprintf(text, sizeof text, "%-14s%-10.4g%-8.4f%-10.4f%-11.3f%s%-+10.1e%.1e\n", stages[k].name.c_str(),
+                  last.time, last.height, last.porosity, last.coordination, strength, last.residue,
+                  in > 0 ? std::abs(last.residue) / in : 0.0);
     out += text;
+    all_in += in, all_residue += last.residue;
   }
+  char text[128];
+  std::snprintf(text, sizeof text, "%-93s%-+10.1e%.1e\n", "all", all_residue, all_in > 0 ? std::abs(all_residue) / all_in : 0.0);
+  out += text;
   return out +
          "peak: largest value; smooth: largest mean over a shear strain of 0.02; ultimate: mean over the last third of the strain\n"
          "energy in: work of wall and driven layer, and what the grains fell\n";

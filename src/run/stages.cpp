@@ -152,7 +152,7 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, dem::
     s.x_start = s.x;
     s.layer_u = 0;
   }
-  scene.dt = c.dt > 0 ? c.dt : step_by_eq_9(scene, s, c.f);
+  scene.dt = c.dt > 0 ? c.dt : step_by_eq_9(scene, s, stage.f);
   s.step = 0, s.staggered = false, s.ledger = {};
   dem::sort_spatially(scene, s);
   return describe(c, index, scene, height_0, s);

@@ -59,7 +59,7 @@ TEST_F(CaseTest, defaults_are_those_of_the_paper) {
   EXPECT_EQ(c.k_n, 1.16e9);
   EXPECT_EQ(c.k_t, 1.16e9);
   EXPECT_EQ(c.gravity, 9.80665);
-  EXPECT_EQ(c.f, 0.075);
+  EXPECT_EQ(c.stages[0].f, 0.075);
   EXPECT_EQ(c.output.series_interval, 0.05);
 
   ASSERT_EQ(c.stages.size(), 2u);
@@ -111,7 +111,7 @@ TEST_F(CaseTest, extends_merges_tables_and_stages_by_name) {
       "[[stage]]\nname = \"more\"\nkind = \"consolidate\"\nnormal_stress = 1e4\nduration = 1\n");
   const Case c = load();
   EXPECT_EQ(c.title, "base");
-  EXPECT_EQ(c.f, 0.05);
+  EXPECT_EQ(c.stages[0].f, 0.05);
   ASSERT_EQ(c.stages.size(), 3u);
   EXPECT_EQ(c.stages[1].name, "shear");
   EXPECT_EQ(c.stages[1].normal_stress, 40e3);
@@ -150,7 +150,7 @@ TEST_F(CaseTest, overrides) {
                        {"grains.count", "1e3"},
                        {"stage.settle.top_wall", "none"},
                        {"box.floor", "false"}});
-  EXPECT_EQ(c.f, 0.05);
+  EXPECT_EQ(c.stages[0].f, 0.05);
   EXPECT_EQ(c.stages[1].normal_stress, 40e3);
   EXPECT_EQ(c.title, "2 words");
   EXPECT_EQ(c.grains.count, 1000);

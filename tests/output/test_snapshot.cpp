@@ -106,7 +106,7 @@ TEST_F(Snapshot, HasUnitsEverywhere) {
     }
   };
   expect_units("grains", {"id", "role", "radius", "position", "displacement", "velocity", "spin", "rotation",
-                          "pressure"});
+                          "force", "pressure"});
   expect_units("contacts", {"id", "i", "j", "point", "force_normal", "force_tangential", "force", "overlap"});
   H5Fclose(file);
 }

@@ -60,12 +60,12 @@ inline const Bed& settled_bed() {
     const Lattice lattice = make_lattice(p);
     Scene s;
     s.box = {lattice.box_x, lattice.box_y, 1};
-    s.grain = s.wall = {1e5, 1e5, 10, 10, 0.5, 0.5};
+    s.grain = s.wall = {1e5, 1e5, 20, 8, 0.5, 0.5};
     s.dt = 0.1 * std::sqrt(mass(s, 0.008) / s.grain.k_n);
     State state = lattice.state;
     sort_spatially(s, state);
     const auto engine = make_engine(Backend::cpu, 1);
-    Bed out{s, run(*engine, s, state, 100000)};
+    Bed out{s, run(*engine, s, state, 60000)};
     synchronise(out.scene, out.state);
     out.state.step = 0, out.state.ledger = {};
     return out;
@@ -105,7 +105,7 @@ inline Bed cloud(Index count, double side, std::uint64_t seed) {
       for (Index j = 0; j < i && free; ++j) {
         Vec3d d = x[i] - x[j];
         for (int a = 0; a < 3; ++a) d[a] -= side * std::rint(d[a] / side);
-        free = length(d) > 0.98 * (r[i] + r[j]);
+        free = length(d) > 0.95 * (r[i] + r[j]);
       }
     }
   }

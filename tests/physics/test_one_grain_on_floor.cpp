@@ -139,9 +139,9 @@ Incline roll_down(double theta, double mu, double l_expected) {
     Kinematics<Triple> kinematics{grain.x, grain.v, grain.omega, rotation};
     leapfrog(kinematics, a, Triple(mobility_of.spin_acceleration(torque)), dt);
     grain.x = kinematics.x, grain.v = kinematics.v, grain.omega = kinematics.omega;
-    const Action<double> action =
+    const auto action =
         wall_action<features>(s.wall, s.dt, Drive{}, grain, NowRow{}, WallName::floor, spring);
-    f = action.f, torque = action.n_x_f;
+    f = action.f, torque = action.torque;
   }
   const double time = steps * s.dt;
   return {grain.v.x / time, grain.omega.y / time};

@@ -1,0 +1,199 @@
+// The contact law by itself.
+#include <random>
+
+#include "dem/contact.hpp"
+#include "dem/engine_parts.hpp"
+#include "physics/scenes.hpp"
+
+namespace moraine::dem {
+namespace {
+
+constexpr Features plain{true, false, false, true}, softening{true, false, true, true}, viscous{true, true, false, true},
+    everything{true, true, true, true};
+constexpr double k = 1e5, r = 0.01;
+
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : engine_(seed) {}
+  double operator()(double low, double high) {
+    return low + (high - low) * (static_cast<double>(engine_() >> 11) * 0x1p-53);
+  }
+  Vec3d vector(double size) { return {(*this)(-size, size), (*this)(-size, size), (*this)(-size, size)}; }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+struct Input {
+  Vec3d x;
+  double r_i, r_j;
+  Motion<double> before, now;
+  Spring<double> spring;
+};
+Input any_input(Random& random) {
+  Input q;
+  q.r_i = random(0.008, 0.012), q.r_j = random(0.008, 0.012);
+  const Vec3d n = random.vector(1);
+  q.x = (random(0.98, 1.005) * (q.r_i + q.r_j) / length(n)) * n;  // one in five is open
+  q.before = {random.vector(1), random.vector(100), random.vector(100)};
+  q.now = {random.vector(1), random.vector(100), random.vector(100)};
+  q.spring = {random(0, 1) < 0.2 ? Vec3d{0, 0, 0} : random.vector(1e-4), random(0, 1) < 0.5 ? 1.0 : 0.0};
+  return q;
+}
+
+template <Features F>
+void expect_lanes_equal_doubles() {
+  Random random(11);
+  const ContactParameters law{k, 0.7 * k, 5, 3, 0.5, 0.4};
+  const double dt = 1e-5;
+  for (int round = 0; round < 500; ++round) {
+    Input q[4];
+    for (Input& one : q) one = any_input(random);
+    const auto lanes = [&](auto value) { return Pack(value(q[0]), value(q[1]), value(q[2]), value(q[3])); };
+    const auto vectors = [&](auto value) {
+      return Vec3<Pack>{lanes([&](const Input& i) { return value(i).x; }), lanes([&](const Input& i) { return value(i).y; }),
+                        lanes([&](const Input& i) { return value(i).z; })};
+    };
+    const auto motion = [&](Motion<double> Input::*m) {
+      return Motion<Pack>{vectors([&](const Input& i) { return (i.*m).v; }),
+                          vectors([&](const Input& i) { return (i.*m).omega_i; }),
+                          vectors([&](const Input& i) { return (i.*m).omega_j; })};
+    };
+    const auto g = between_grains<Pack>(vectors([](const Input& i) { return i.x; }),
+                                        lanes([](const Input& i) { return i.r_i + i.r_j; }),
+                                        lanes([](const Input& i) { return i.r_i - i.r_j; }));
+    Spring<Pack> spring{vectors([](const Input& i) { return i.spring.delta_t; }),
+                        lanes([](const Input& i) { return i.spring.slipping; })};
+    const Action<Pack> a = contact_law<F, Pack>(law, dt, g, motion(&Input::before), motion(&Input::now), spring);
+
+    for (int l = 0; l < 4; ++l) {
+      Spring<double> s = q[l].spring;
+      const auto g1 = between_grains(q[l].x, q[l].r_i + q[l].r_j, q[l].r_i - q[l].r_j);
+      const Action<double> b = contact_law<F>(law, dt, g1, q[l].before, q[l].now, s);
+      const double got[] = {a.f.x[l],     a.f.y[l],     a.f.z[l], a.n_x_f.x[l], a.n_x_f.y[l],
+                            a.n_x_f.z[l], a.slip[l],    spring.delta_t.x[l],
+                            spring.delta_t.y[l],        spring.delta_t.z[l], spring.slipping[l]};
+      const double expected[] = {b.f.x,     b.f.y,       b.f.z,       b.n_x_f.x,   b.n_x_f.y, b.n_x_f.z,
+                                 b.slip, s.delta_t.x, s.delta_t.y, s.delta_t.z, s.slipping};
+      for (int c = 0; c < 11; ++c) ASSERT_EQ(std::memcmp(&got[c], &expected[c], 8), 0) << "component " << c;
+    }
+  }
+}
+
+TEST(ContactLaw, LanesOfAPackGiveTheBitsOfDoubles) {
+  expect_lanes_equal_doubles<plain>();
+  expect_lanes_equal_doubles<softening>();
+  expect_lanes_equal_doubles<viscous>();
+  expect_lanes_equal_doubles<everything>();
+  expect_lanes_equal_doubles<Features{false, false, false, true}>();
+  expect_lanes_equal_doubles<Features{false, true, false, true}>();
+}
+
+// Whatever moves: no pull, no more friction than mu_s allows, no force and no memory when open, no negative slip.
+TEST(ContactLaw, StaysWithinItsLimits) {
+  Random random(12);
+  const ContactParameters law{k, 0.7 * k, 5, 3, 0.5, 0.4};
+  for (int round = 0; round < 20000; ++round) {
+    const Input q = any_input(random);
+    const auto g = between_grains(q.x, q.r_i + q.r_j, q.r_i - q.r_j);
+    Spring<double> s = q.spring;
+    const Action<double> a = contact_law<everything>(law, 1e-5, g, q.before, q.now, s);
+    const double f_n = dot(a.f, g.n);
+    const Vec3d f_t = a.f - f_n * g.n;
+    EXPECT_GE(f_n, -1e-12);
+    EXPECT_LE(length(f_t), law.mu_s * std::max(f_n, 0.0) + 1e-12 * k * r);
+    EXPECT_NEAR(dot(s.delta_t, g.n), 0, 0.02 * length(s.delta_t) + 1e-18);
+    if (g.delta_n < 0) continue;
+    EXPECT_EQ(length(a.f), 0);
+    EXPECT_EQ(length(s.delta_t), 0);
+    EXPECT_EQ(s.slipping, 0);
+  }
+}
+
+// An open contact that held no spring has nothing to dissipate, exactly: or the ledger would depend on which pairs are near.
+TEST(ContactLaw, OpenPairsDissipateNothing) {
+  Random random(13);
+  for (int round = 0; round < 1000; ++round) {
+    Input q = any_input(random);
+    q.spring = {{0, 0, 0}, 0};
+    const auto g = between_grains(1.05 * q.x, q.r_i + q.r_j, q.r_i - q.r_j);
+    ASSERT_EQ(contact_law<plain>({k, k, 0, 0, 0.5, 0.5}, 1e-5, g, q.before, q.now, q.spring).slip, 0);
+  }
+}
+
+// Two grains held at a constant overlap, one pulled sideways at a constant speed.
+template <Features F>
+std::vector<double> pulled_sideways(const ContactParameters& law, double overlap, double step_length, int steps) {
+  const auto g = between_grains(Vec3d{0, 0, 2 * r - overlap}, 2 * r, 0.0);
+  const double dt = 1e-5;
+  const Motion<double> m{{step_length / dt, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+  Geometry<double> held = g;
+  held.curvature = 0;  // no turning: a plane test
+  Spring<double> s{{0, 0, 0}, 0};
+  std::vector<double> f_t;
+  for (int step = 0; step < steps; ++step) f_t.push_back(-contact_law<F>(law, dt, held, m, m, s).f.x);
+  return f_t;
+}
+
+TEST(ContactLaw, SticksThenSlips) {
+  const double overlap = 1e-4, f_n = k * overlap;
+  const std::vector<double> f = pulled_sideways<plain>({k, k, 0, 0, 0.3, 0.3}, overlap, 1e-7, 1000);
+  for (std::size_t step = 0; step < f.size(); ++step)
+    EXPECT_NEAR(f[step], std::min(k * 1e-7 * (step + 1.0), 0.3 * f_n), 1e-12 * f_n);
+}
+
+// It holds up to mu_s, then carries mu_d for as long as it slides; once it has stood still it holds up to mu_s again.
+TEST(ContactLaw, SoftensWhenItSlips) {
+  const double overlap = 1e-4, f_n = k * overlap;
+  const ContactParameters law{k, k, 0, 0, 0.5, 0.3};
+  const std::vector<double> f = pulled_sideways<softening>(law, overlap, 1e-7, 2000);
+  const auto peak = std::max_element(f.begin(), f.end());
+  EXPECT_NEAR(*peak, 0.5 * f_n, k * 1e-7);
+  for (auto later = peak + 1; later != f.end(); ++later) EXPECT_NEAR(*later, 0.3 * f_n, 1e-12 * f_n);
+
+  auto g = between_grains(Vec3d{0, 0, 2 * r - overlap}, 2 * r, 0.0);
+  g.curvature = 0;
+  const double dt = 1e-5;
+  const auto moving = [](double v) { return Motion<double>{{v, 0, 0}, {0, 0, 0}, {0, 0, 0}}; };
+  Spring<double> s{{0, 0, 0}, 0};
+  const auto pull = [&](double v) { return -contact_law<softening>(law, dt, g, moving(v), moving(v), s).f.x; };
+  for (int step = 0; step < 1000; ++step) pull(0.01);
+  EXPECT_EQ(s.slipping, 1);
+  pull(0);
+  EXPECT_EQ(s.slipping, 0);
+  double again = 0;
+  for (int step = 0; step < 1000; ++step) again = std::max(again, pull(0.01));
+  EXPECT_NEAR(again, 0.5 * f_n, k * 1e-7);
+}
+
+TEST(ContactLaw, ViscousWallWithoutSpring) {
+  const double overlap = 1e-4, f_n = k * overlap;
+  const ContactParameters wall{k, 0, 0, 20, 0.3, 0.3};
+  for (const double v : {0.01, 0.1, 0.149, 0.151, 1.0}) {
+    Spring<double> s{{0, 0, 0}, 0};
+    const GrainRow grain{{0, 0, r - overlap}, r, {v, 0, 0}, r, {0, 0, 0}, 0};
+    for (int step = 0; step < 100; ++step) {  // no memory: the same at every step
+      const auto a = wall_action<viscous>(wall, 1e-5, Drive{}, grain, {{v, 0, 0}, 0, {0, 0, 0}, 0}, WallName::floor, s);
+      EXPECT_NEAR(a.f.x, -std::min(20 * v, 0.3 * f_n), 1e-12 * f_n);
+      EXPECT_NEAR(a.f.z, f_n, 1e-12 * f_n);
+    }
+  }
+}
+
+// The same plane from below and from above.
+TEST(ContactLaw, TopWallMirrorsTheFloor) {
+  const ContactParameters wall{k, k, 5, 3, 0.3, 0.3};
+  Spring<double> below{{0, 0, 0}, 0}, above{{0, 0, 0}, 0};
+  Drive drive{};
+  drive.wall_z = 1;
+  const Vec3d v{0.1, -0.2, -0.05}, omega{3, 4, 5};
+  const GrainRow low{{0, 0, 0.99 * r}, r, v, r, omega, 0};
+  const Vec3d v_up{v.x, v.y, -v.z}, omega_up{-omega.x, -omega.y, omega.z};
+  const GrainRow high{{0, 0, 1 - 0.99 * r}, r, v_up, r, omega_up, 0};
+  const auto a = wall_action<viscous>(wall, 1e-5, drive, low, {v, 0, omega, 0}, WallName::floor, below);
+  const auto b = wall_action<viscous>(wall, 1e-5, drive, high, {v_up, 0, omega_up, 0}, WallName::top, above);
+  EXPECT_LT(length(b.f - Vec3d{a.f.x, a.f.y, -a.f.z}), 1e-12 * length(a.f));
+}
+
+}  // namespace
+}  // namespace moraine::dem

@@ -1,0 +1,95 @@
+#include "dem/packing.hpp"
+
+#include "error.hpp"
+#include "physics/scenes.hpp"
+
+namespace moraine::dem {
+namespace {
+
+double largest(const std::vector<double>& r) { return *std::max_element(r.begin(), r.end()); }
+
+TEST(Packing, Radii) {
+  Packing p;  // mean 0.02, deviation 9.38e-5, 10000 grains
+  const std::vector<double> r = make_lattice(p).state.r;
+  double mean = 0, log_mean = 0, variance = 0, skew = 0;
+  const double n = static_cast<double>(r.size());
+  for (const double x : r) mean += x / n, log_mean += std::log(x) / n;
+  for (const double x : r) {
+    variance += (x - mean) * (x - mean) / n;
+    skew += std::pow(std::log(x) - log_mean, 3) / n;
+  }
+  const double deviation = std::sqrt(variance), relative = p.radius_std / p.radius_mean;
+  // Four standard errors.
+  EXPECT_NEAR(mean, p.radius_mean, 4 * p.radius_std / std::sqrt(n));
+  EXPECT_NEAR(deviation, p.radius_std, 4 * p.radius_std / std::sqrt(2 * n));
+  EXPECT_NEAR(skew / std::pow(relative, 3), 0, 4 * std::sqrt(6 / n));  // log r is normal
+
+  p.distribution = Packing::Distribution::uniform;
+  p.radius_min = 0.01, p.radius_max = 0.03;
+  double sum = 0, sum2 = 0;
+  for (const double x : make_lattice(p).state.r) {
+    EXPECT_TRUE(x >= 0.01 && x <= 0.03) << x;
+    sum += x / n, sum2 += x * x / n;
+  }
+  const double spread = 0.02 / std::sqrt(12);
+  EXPECT_NEAR(sum, 0.02, 4 * spread / std::sqrt(n));
+  EXPECT_NEAR(std::sqrt(sum2 - sum * sum), spread, 4 * spread / std::sqrt(n));
+}
+
+TEST(Packing, BoxOfTheDefaults) {
+  Packing p;
+  const Lattice l = make_lattice(p);
+  EXPECT_DOUBLE_EQ(l.cell, 2.1 * 2 * largest(l.state.r));
+  EXPECT_DOUBLE_EQ(l.box_x, 10 * l.cell);
+  EXPECT_NEAR(l.box_x, 0.86, 0.005);
+  double top = 0;
+  for (const Vec3d& x : l.state.x) top = std::max(top, x.z);
+  EXPECT_LT(top, 100 * l.cell);
+  EXPECT_GT(top, 99 * l.cell);
+}
+
+TEST(Packing, SameSeedSameGrains) {
+  Packing p;
+  p.count = 500;
+  const Lattice a = make_lattice(p), b = make_lattice(p);
+  expect_same_bits(a.state, b.state);
+  p.seed = 2;
+  const Lattice c = make_lattice(p);
+  EXPECT_NE(a.state.r, c.state.r);
+  EXPECT_NE(a.state.x, c.state.x);
+}
+
+// Also across the periodic sides, and however tight the cells are.
+TEST(Packing, NoOverlaps) {
+  for (const double cell : {1.05, 1.3, 2.1}) {
+    Packing p;
+    p.count = 300, p.columns_x = 4, p.columns_y = 6, p.cell = cell;
+    p.distribution = Packing::Distribution::uniform, p.radius_min = 0.005, p.radius_max = 0.02;
+    const Lattice l = make_lattice(p);
+    const State& s = l.state;
+    for (Index i = 0; i < s.size(); ++i) {
+      EXPECT_GE(s.x[i].z, s.r[i]);
+      for (Index j = 0; j < i; ++j) {
+        Vec3d d = s.x[i] - s.x[j];
+        d.x -= l.box_x * std::rint(d.x / l.box_x), d.y -= l.box_y * std::rint(d.y / l.box_y);
+        ASSERT_GT(length(d), s.r[i] + s.r[j]);
+      }
+    }
+  }
+}
+
+TEST(Packing, RefusesCellsThatAreTooSmall) {
+  Packing p;
+  p.count = 100, p.cell = 1.0;
+  EXPECT_THROW(make_lattice(p), Error);
+  p.cell = 2.1, p.box_x = 0.3;  // ten columns of 0.04 m grains
+  try {
+    make_lattice(p);
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_NE(std::string(e.what()).find("overlap at the start"), std::string::npos) << e.what();
+  }
+}
+
+}  // namespace
+}  // namespace moraine::dem

@@ -1,0 +1,87 @@
+// The same scene gives the same bits, whatever computes it.
+#include "backends.hpp"
+#include "physics/scenes.hpp"
+
+namespace moraine::dem {
+namespace {
+
+constexpr std::int64_t steps = 1500;  // some neighbour searches, many near lists
+
+struct Named {
+  const char* name;
+  Bed bed;
+};
+const std::vector<Named>& scenes() {
+  static const std::vector<Named> all = [] {
+    std::vector<Named> a{{"sheared bed, damped walls", sheared_bed()}, {"softening", sheared_bed()},
+                         {"layer driven by stress", sheared_bed()}, {"held height", sheared_bed()},
+                         {"swinging load, walls with k_t = 0, no ledger", sheared_bed()},
+                         {"damped grains", sheared_bed()}, {"no friction", sheared_bed()},
+                         {"cloud", cloud(700, 0.2, 5)}, {"small box", cloud(22, 0.065, 5)}};
+    a[1].bed.scene.grain.mu_d = a[1].bed.scene.wall.mu_d = 0.3;
+    a[2].bed.scene.shear = {Shear::Drive::stress, 0, 400, false};
+    a[3].bed.scene.shear.hold_z = true;
+    a[4].bed.scene.top_wall.amplitude = 200, a[4].bed.scene.top_wall.frequency = 30;
+    a[4].bed.scene.wall.k_t = 0, a[4].bed.scene.ledger = false;
+    a[5].bed.scene.grain.gamma_n = a[5].bed.scene.grain.gamma_t = 5;
+    a[6].bed.scene.grain.mu_s = a[6].bed.scene.grain.mu_d = 0;
+    a[6].bed.scene.wall.mu_s = a[6].bed.scene.wall.mu_d = 0;
+    return a;
+  }();
+  return all;
+}
+
+State one_thread(const Bed& bed) { return run(*make_engine(Backend::cpu, 1), bed.scene, bed.state, steps); }
+
+class Determinism : public OnEveryBackend {};
+
+TEST_P(Determinism, EveryBackendGivesTheSameBits) {
+  const auto engine = make();
+  for (const Named& scene : scenes()) {
+    SCOPED_TRACE(scene.name);
+    expect_same_bits(run(*engine, scene.bed.scene, scene.bed.state, steps), one_thread(scene.bed));
+  }
+}
+
+// A state taken on the way into a new engine goes on as if nothing had been. In pieces, too.
+TEST_P(Determinism, RunAndRestart) {
+  for (const Named& scene : scenes()) {
+    SCOPED_TRACE(scene.name);
+    const State whole = run(*make(), scene.bed.scene, scene.bed.state, steps);
+    const State part = run(*make(), scene.bed.scene, scene.bed.state, steps / 3);
+    const auto second = make();
+    second->load(scene.bed.scene, part);
+    expect_same_bits(second->state(), part);
+    second->advance(100);
+    expect_same_bits(run(*make(), scene.bed.scene, second->state(), steps - steps / 3 - 100), whole);
+  }
+}
+
+TEST_P(Determinism, NeighbourMargin) {
+  for (const Named& scene : scenes()) {
+    SCOPED_TRACE(scene.name);
+    const State usual = run(*make(), scene.bed.scene, scene.bed.state, steps);
+    double mean = 0;
+    for (const double r : usual.r) mean += r / usual.size();
+    for (const double factor : {0.5, 2.0}) {
+      Scene s = scene.bed.scene;
+      s.neighbour_margin = factor * 0.05 * mean;
+      expect_same_bits(run(*make(), s, scene.bed.state, steps), usual);
+    }
+  }
+}
+
+ON_EVERY_BACKEND(Determinism);
+
+TEST(Threads, OneTwoFour) {
+  for (const Named& scene : scenes()) {
+    SCOPED_TRACE(scene.name);
+    const State one = one_thread(scene.bed);
+    expect_same_bits(one_thread(scene.bed), one);  // and twice the same
+    for (const int threads : {2, 4})
+      expect_same_bits(run(*make_engine(Backend::cpu, threads), scene.bed.scene, scene.bed.state, steps), one);
+  }
+}
+
+}  // namespace
+}  // namespace moraine::dem

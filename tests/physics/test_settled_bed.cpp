@@ -1,0 +1,55 @@
+// A bed at rest under its own weight.
+#include "backends.hpp"
+#include "physics/scenes.hpp"
+
+namespace moraine::dem {
+namespace {
+
+// Forces through the horizontal plane at z, upwards, N.
+double carried(const State& s, const std::vector<ContactForce>& contacts, double z) {
+  double sum = 0;
+  for (const ContactForce& c : contacts) {
+    const double f = c.f_n.z + c.f_t.z;
+    if (s.x[c.i].z > z && s.x[c.j].z <= z) sum += f;
+    if (s.x[c.j].z > z && s.x[c.i].z <= z) sum -= f;
+  }
+  return sum;
+}
+
+class SettledBed : public OnEveryBackend {};
+
+TEST_P(SettledBed, StressIsWeight) {
+  const Bed& bed = settled_bed();
+  const Scene& s = bed.scene;
+  const auto engine = make();
+  const State now = run(*engine, s, bed.state, 2000);
+  const Observation o = observe(s, now);
+  double weight = 0, top = 0;
+  for (Index i = 0; i < now.size(); ++i) weight += mass(s, now.r[i]) * s.gravity, top = std::max(top, now.x[i].z);
+  ASSERT_LT(o.unbalanced_force, 1e-3);  // what still moves sets the bounds below
+  EXPECT_NEAR(o.normal_stress * s.area() / weight, 1, 1e-4);
+
+  const std::vector<ContactForce> contacts = contact_forces(s, now);
+  double n = 0, z1 = 0, z2 = 0, f1 = 0, zf = 0;
+  std::vector<std::pair<double, double>> profile;
+  for (double z = 0.3 * top; z < 0.85 * top; z += 0.005 * top) {
+    double above = 0;
+    for (Index i = 0; i < now.size(); ++i)
+      if (now.x[i].z > z) above += mass(s, now.r[i]) * s.gravity;
+    const double f = carried(now, contacts, z);
+    EXPECT_NEAR(f, above, 1e-4 * weight) << "z = " << z;
+    profile.push_back({z, f});
+    n += 1, z1 += z, z2 += z * z, f1 += f, zf += z * f;
+  }
+  // Linear: no more off the straight line than half a layer of grains, which is how much single grains let it jump; the
+  // slope is the mean weight per height.
+  const double slope = (n * zf - z1 * f1) / (n * z2 - z1 * z1), base = (f1 - slope * z1) / n;
+  const double layer = 25 * mass(s, 0.01) * s.gravity;
+  for (const auto& [z, f] : profile) EXPECT_NEAR(f, base + slope * z, 0.5 * layer);
+  EXPECT_NEAR(-slope / ((1 - o.porosity) * s.density * s.gravity * s.area()), 1, 0.05);
+}
+
+ON_EVERY_BACKEND(SettledBed);
+
+}  // namespace
+}  // namespace moraine::dem
