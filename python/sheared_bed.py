@@ -96,7 +96,7 @@ def main(case, picture):
     plt.rcParams.update({"font.size": 9, "font.family": "DejaVu Sans", "axes.spines.top": False,
                          "axes.spines.right": False, "axes.linewidth": 0.7})
     figure = plt.figure(figsize=(10, 4.1), dpi=112)
-    figure.subplots_adjust(left=0.01, right=0.985, top=0.93, bottom=0.13)
+    figure.subplots_adjust(left=0.015, right=0.975, top=0.93, bottom=0.13)
     grid = figure.add_gridspec(2, 3, width_ratios=(2.35, 0.95, 1.6), wspace=0.32, hspace=0.16)
 
     bed = figure.add_subplot(grid[:, 0])

@@ -13,12 +13,15 @@ using namespace moraine;
 int main(int argc, char** argv) {
 #if defined(__AVX2__)
   if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) {
-    std::fputs("moraine was built for processors with AVX2 and FMA, and this one lacks them: rebuild it here, with "
-               "-DMORAINE_ARCH=x86-64\n", stderr);
+    std::fputs(
+        "moraine was built for processors with AVX2 and FMA, and this one lacks them: rebuild it here, with "
+        "-DMORAINE_ARCH=x86-64\n",
+        stderr);
     return 1;
   }
 #endif
-  CLI::App app{"Grain-scale till mechanics: shears beds of grains under a stress-controlled wall.", "moraine"};
+  CLI::App app{"Grain-scale till mechanics: shears beds of grains under a stress-controlled wall.",
+               "moraine"};
   app.set_version_flag("--version", "moraine " MORAINE_VERSION);
   app.require_subcommand(1);
 
@@ -28,10 +31,17 @@ int main(int argc, char** argv) {
   std::string backend = "auto";
   const auto takes_case = [&](CLI::App* command) {
     command->add_option("CASE", options.directory, "directory that holds a case.toml")->required();
-    command->add_option("--set", sets, "override a key: --set model.f=0.05 --set \"stage.shear.normal_stress=40 kPa\"")
-        ->type_name("KEY=VALUE")->allow_extra_args(false);
-    command->add_option("--backend", backend, "processor")->check(CLI::IsMember({"cpu", "cuda", "auto"}))->capture_default_str();
-    command->add_option("--threads", options.threads, "CPU threads; 0: all cores")->check(CLI::Range(0, 4096))->capture_default_str();
+    command
+        ->add_option("--set", sets,
+                     "override a key: --set model.f=0.05 --set \"stage.shear.normal_stress=40 kPa\"")
+        ->type_name("KEY=VALUE")
+        ->allow_extra_args(false);
+    command->add_option("--backend", backend, "processor")
+        ->check(CLI::IsMember({"cpu", "cuda", "auto"}))
+        ->capture_default_str();
+    command->add_option("--threads", options.threads, "CPU threads; 0: all cores")
+        ->check(CLI::Range(0, 4096))
+        ->capture_default_str();
   };
 
   // 2. The commands.
@@ -46,14 +56,16 @@ int main(int argc, char** argv) {
 
   CLI::App* keys = app.add_subcommand("keys", "list all keys of case.toml");
 
-  CLI::App* bench = app.add_subcommand("bench", "time some steps of a case without output; prints one line of JSON");
+  CLI::App* bench =
+      app.add_subcommand("bench", "time some steps of a case without output; prints one line of JSON");
   takes_case(bench);
   std::int64_t steps = 1000;
   std::string stage;
   bench->add_option("--steps", steps, "steps to time")->check(CLI::PositiveNumber)->capture_default_str();
   bench->add_option("--stage", stage, "stage to time; default: the first");
 
-  CLI::App* import = app.add_subcommand("import-sphere", "make a case from a binary file of the program sphere");
+  CLI::App* import =
+      app.add_subcommand("import-sphere", "make a case from a binary file of the program sphere");
   std::string file, directory;
   import->add_option("FILE", file, "binary file, version 1.03 to 2.15")->required();
   import->add_option("CASE", directory, "directory to create")->required();
@@ -67,7 +79,9 @@ int main(int argc, char** argv) {
       if (equals == std::string::npos) throw error("--set ", set, ": expected KEY=VALUE");
       options.overrides.push_back({set.substr(0, equals), set.substr(equals + 1)});
     }
-    options.backend = backend == "cpu" ? dem::Backend::cpu : backend == "cuda" ? dem::Backend::cuda : dem::Backend::automatic;
+    options.backend = backend == "cpu"    ? dem::Backend::cpu
+                      : backend == "cuda" ? dem::Backend::cuda
+                                          : dem::Backend::automatic;
     if (*run) run::run_case(options);
     if (*check) run::check_case(options);
     if (*keys) std::cout << cases::reference();

@@ -1,7 +1,7 @@
 // The GPU as a place to compute; see host.hpp for the contract of each function.
 #pragma once
-#include <cub/cub.cuh>
 #include <cstdint>
+#include <cub/cub.cuh>
 #include <vector>
 
 #include "error.hpp"
@@ -42,7 +42,8 @@ struct Cuda {
     T* data() const { return data_; }
     void set(const std::vector<T>& v) {
       resize(static_cast<std::int64_t>(v.size()));
-      cuda_check(cudaMemcpy(data_, v.data(), v.size() * sizeof(T), cudaMemcpyHostToDevice), "copy to the GPU");
+      cuda_check(cudaMemcpy(data_, v.data(), v.size() * sizeof(T), cudaMemcpyHostToDevice),
+                 "copy to the GPU");
     }
     std::vector<T> get() const {
       std::vector<T> v(size_);
@@ -76,8 +77,8 @@ struct Cuda {
     Array<std::int32_t> k_out, v_out;
     k_out.resize(keys.size()), v_out.resize(values.size());
     with_scratch([&](void* scratch, std::size_t& bytes) {
-      return cub::DeviceRadixSort::SortPairs(scratch, bytes, keys.data(), k_out.data(), values.data(), v_out.data(),
-                                             keys.size());
+      return cub::DeviceRadixSort::SortPairs(scratch, bytes, keys.data(), k_out.data(), values.data(),
+                                             v_out.data(), keys.size());
     });
     keys = std::move(k_out), values = std::move(v_out);
   }

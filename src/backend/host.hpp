@@ -1,5 +1,5 @@
-// The host as a place to compute: memory, loops over an index, scan and sort. cuda.cuh gives the same for the GPU, so
-// that code templated on Space runs on either.
+// The host as a place to compute: memory, loops over an index, scan and sort. cuda.cuh gives the same for the
+// GPU, so that code templated on Space runs on either.
 #pragma once
 #include <algorithm>
 #include <cstdint>
@@ -75,9 +75,13 @@ struct Host {
   }
 
   template <class T>
-  T read(const T* p) const { return *p; }
+  T read(const T* p) const {
+    return *p;
+  }
   template <class T>
-  void write(T* p, const T& value) const { *p = value; }
+  void write(T* p, const T& value) const {
+    *p = value;
+  }
 };
 
 }  // namespace moraine

@@ -1,5 +1,6 @@
-// What pushes the bed from outside: the top wall and the layer of driven grains, and the account of the energy they give
-// and the contacts take. One small struct of numbers; every thread advances a copy of its own and all stay equal.
+// What pushes the bed from outside: the top wall and the layer of driven grains, and the account of the
+// energy they give and the contacts take. One small struct of numbers; every thread advances a copy of its
+// own and all stay equal.
 #pragma once
 #include "dem/scene.hpp"
 #include "dem/state.hpp"
@@ -8,9 +9,10 @@ namespace moraine::dem {
 
 // Sums over grains at one step, each in a fixed order.
 struct Reaction {
-  double wall_force = 0;   // N, on the top wall, upwards
-  double shear_force = 0;  // N, x force on the top layer
-  double wall_damping = 0;  // N, the viscous part of wall_force
+  double wall_force = 0;     // N, on the top wall, upwards
+  double shear_force = 0;    // N, x force on the top layer
+  double wall_damping = 0;   // N, the viscous part of wall_force
+  double layer_damping = 0;  // N, of shear_force
 };
 struct Dissipation {
   double slip = 0;           // J, in the step
@@ -18,21 +20,23 @@ struct Dissipation {
 };
 
 struct Drive {
-  double wall_z = 0, wall_v = 0;         // m, m/s; v at n - 1/2
-  double wall_dz = 0, wall_v_now = 0;    // m, of the last step; m/s, at n
-  double wall_v_ahead = 0;               // m/s, at n as foreseen before its forces are known (viscous contacts)
+  double wall_z = 0, wall_v = 0;       // m, m/s; v at n - 1/2
+  double wall_dz = 0, wall_v_now = 0;  // m, of the last step; m/s, at n
+  double wall_v_ahead = 0;             // m/s, at n as foreseen before its forces are known (viscous contacts)
   double layer_u = 0, layer_mass = 0;
-  Reaction at, before;                 // at the present step and one earlier
-  double sigma = 0, sigma_before = 0;  // Pa, asked of the wall
+  double layer_u_now = 0, layer_u_ahead = 0;  // m/s, as the wall's
+  Reaction at, before;                        // at the present step and one earlier
+  double sigma = 0, sigma_before = 0;         // Pa, asked of the wall
   Ledger ledger;
   std::int64_t step = 0;
 
-  // Takes the forces of the present step and closes the account of the step that led to it. Work is counted with the
-  // mean of the forces before and after, as leapfrog does it.
+  // Takes the forces of the present step and closes the account of the step that led to it. Work is counted
+  // with the mean of the forces before and after, as leapfrog does it.
   MORAINE_HD void close(const Scene& s, const Reaction& reaction) {
     take(s, reaction);
     const double area = s.box.x * s.box.y;
-    if (s.top_wall.drive == TopWall::Drive::stress) ledger.top_wall -= 0.5 * (sigma_before + sigma) * area * wall_dz;
+    if (s.top_wall.drive == TopWall::Drive::stress)
+      ledger.top_wall -= 0.5 * (sigma_before + sigma) * area * wall_dz;
     if (s.top_wall.drive == TopWall::Drive::velocity)
       ledger.top_wall -= 0.5 * (before.wall_force + at.wall_force) * wall_dz;
     if (s.shear.drive == Shear::Drive::velocity)
@@ -46,11 +50,14 @@ struct Drive {
     ledger.viscous += 0.5 * (ledger.viscous_power + power) * s.dt;
     ledger.viscous_power = power;
   }
-  MORAINE_HD double viscous_power(const Dissipation& d) const { return -d.damping_power - at.wall_damping * wall_v_now; }
+  MORAINE_HD double viscous_power(const Dissipation& d) const {
+    return -d.damping_power - at.wall_damping * wall_v_now - at.layer_damping * (layer_u_now - layer_u);
+  }
   MORAINE_HD void take(const Scene& s, const Reaction& reaction) {
     at = reaction;
     sigma = s.normal_stress(static_cast<double>(step) * s.dt);
     wall_v_now = fma(wall_acceleration(s), 0.5 * s.dt, wall_v);
+    layer_u_now = fma(layer_acceleration(s), 0.5 * s.dt, layer_u);
   }
 
   // Wall and layer from step n to n + 1 (velocities from n - 1/2 to n + 1/2).
@@ -62,7 +69,9 @@ struct Drive {
     wall_v_ahead = fma(acceleration, 0.5 * s.dt, wall_v);
     wall_dz = wall_v * s.dt;
     wall_z += wall_dz;
-    layer_u = fma(layer_acceleration(s), s.dt, layer_u);
+    const double layer = layer_acceleration(s);
+    layer_u = fma(layer, s.dt, layer_u);
+    layer_u_ahead = fma(layer, 0.5 * s.dt, layer_u);
     ++step;
   }
   MORAINE_HD void half_step(const Scene& s, double sign) {

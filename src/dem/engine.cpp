@@ -31,7 +31,9 @@ std::unique_ptr<Engine> make_engine(Backend backend, int threads) {
   if (backend == Backend::automatic) backend = cuda_device_present() ? Backend::cuda : Backend::cpu;
   if (backend == Backend::cpu) return make_pair_engine(threads);
   if (!cuda_built())
-    throw error("--backend cuda: this build has no CUDA in it; configure with -DMORAINE_CUDA=ON (./moraine --cuda ...) where nvcc is installed");
+    throw error(
+        "--backend cuda: this build has no CUDA in it; configure with -DMORAINE_CUDA=ON (./moraine --cuda "
+        "...) where nvcc is installed");
   if (!cuda_device_present()) throw error("--backend cuda: no NVIDIA GPU was found; use --backend cpu");
 #if defined(MORAINE_CUDA)
   return make_cuda_engine();

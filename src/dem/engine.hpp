@@ -1,5 +1,6 @@
-// What moves the grains. Two engines share one physics (contact.hpp, integrate.hpp): PairEngine for the CPU walks pairs in
-// SIMD packs; GatherEngine for the GPU lets each grain walk its own contacts (it also runs on the host, for tests).
+// What moves the grains. Two engines share one physics (contact.hpp, integrate.hpp): PairEngine for the CPU
+// walks pairs in SIMD packs; GatherEngine for the GPU lets each grain walk its own contacts (it also runs on
+// the host, for tests).
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -15,10 +16,12 @@ class Engine {
   virtual ~Engine() = default;
 
   // Takes the state over. One that is not staggered gets its forces evaluated (springs as they are) and its
-  // velocities taken half a step back; all others go on with the same bits. Throws Error on an unsupported scene.
+  // velocities taken half a step back; all others go on with the same bits. Throws Error on an unsupported
+  // scene.
   virtual void load(const Scene& scene, const State& state) = 0;
 
-  // Advances so many steps. Throws Error naming grain, step and place when a number stops being finite or a grain leaves.
+  // Advances so many steps. Throws Error naming grain, step and place when a number stops being finite or a
+  // grain leaves.
   virtual void advance(std::int64_t steps) = 0;
 
   // The staggered state at the present step.
@@ -36,7 +39,8 @@ class Engine {
 
 enum class Backend { automatic, cpu, cuda, reference };  // reference: the GPU's loop on the host
 
-// threads = 0: one for each core that this process may use, but fewer for a small bed. Throws Error where the backend is not built in or has no device.
+// threads = 0: one for each core that this process may use, but fewer for a small bed. Throws Error where the
+// backend is not built in or has no device.
 std::unique_ptr<Engine> make_engine(Backend backend, int threads = 0);
 
 bool cuda_built();

@@ -9,7 +9,9 @@ void check_scene(const Scene& s, const State& state) {
   if (state.size() == 0) throw error("there are no grains");
   if (!(s.dt > 0)) throw error("time step = ", s.dt, " s: expected a positive number");
   if (s.periodic_z && (s.floor || s.top_wall.drive != TopWall::Drive::none))
-    throw error("sides periodic along z leave no room for a floor or a top wall: take z out of box.periodic, or the walls away");
+    throw error(
+        "sides periodic along z leave no room for a floor or a top wall: take z out of box.periodic, or the "
+        "walls away");
   if (s.top_wall.drive == TopWall::Drive::stress && !(s.top_wall.mass > 0))
     throw error("top wall mass = ", s.top_wall.mass, " kg: expected a positive number");
   const double r_max = *std::max_element(state.r.begin(), state.r.end());
@@ -17,9 +19,12 @@ void check_scene(const Scene& s, const State& state) {
   const double least = 4 * r_max + 2 * neighbour_margin(s, state);
   for (int a = 0; a < 3; ++a)
     if (side[a] > 0 && side[a] < least)
-      throw error("box.", "xyz"[a], " = ", side[a], " m is too narrow for a periodic side: two grains would touch on both sides; "
-                  "expected at least ", least, " m (two largest diameters and the neighbour margin)");
-  if (s.shear.drive == Shear::Drive::stress && std::count(state.role.begin(), state.role.end(), Role::top) == 0)
+      throw error("box.", "xyz"[a], " = ", side[a],
+                  " m is too narrow for a periodic side: two grains would touch on both sides; "
+                  "expected at least ",
+                  least, " m (two largest diameters and the neighbour margin)");
+  if (s.shear.drive == Shear::Drive::stress &&
+      std::count(state.role.begin(), state.role.end(), Role::top) == 0)
     throw error("a stress is to drive the top layer, but there are no grains in it");
 }
 
@@ -36,8 +41,9 @@ std::vector<GrainRow> grain_rows(const Scene& scene, const State& s) {
     GrainRow& g = rows[i];
     g = {s.x[i], s.r[i], s.v[i], s.r[i], s.omega[i], 0};
     if (s.role[i] == Role::free) continue;
-    const double u = s.role[i] == Role::bottom ? 0
-                     : scene.shear.drive == Shear::Drive::velocity ? scene.shear.velocity : s.layer_u;
+    const double u = s.role[i] == Role::bottom                     ? 0
+                     : scene.shear.drive == Shear::Drive::velocity ? scene.shear.velocity
+                                                                   : s.layer_u;
     g.v = {u, 0, scene.shear.hold_z ? 0 : s.v[i].z};
     g.omega = {0, 0, 0};
   }
@@ -61,10 +67,12 @@ Drive drive_of(const Scene& scene, const State& s) {
 Error lost_grain(const Scene& scene, const Drive& drive, const GrainRow& g, Index id) {
   std::ostringstream place;
   place.precision(9);
-  place << "grain " << id << " at step " << drive.step << " (t = " << static_cast<double>(drive.step) * scene.dt
-        << " s of the stage), position (" << g.x.x << ", " << g.x.y << ", " << g.x.z << ") m, velocity (" << g.v.x << ", "
-        << g.v.y << ", " << g.v.z << ") m/s: ";
-  const char* remedy = "; the step may be too long for the stiffness, or grains overlapped deeply: try a smaller model.f";
+  place << "grain " << id << " at step " << drive.step
+        << " (t = " << static_cast<double>(drive.step) * scene.dt << " s of the stage), position (" << g.x.x
+        << ", " << g.x.y << ", " << g.x.z << ") m, velocity (" << g.v.x << ", " << g.v.y << ", " << g.v.z
+        << ") m/s: ";
+  const char* remedy =
+      "; the step may be too long for the stiffness, or grains overlapped deeply: try a smaller model.f";
   if (!(dot(g.x, g.x) + dot(g.v, g.v) + dot(g.omega, g.omega) < 1e300))
     return error(place.str(), "not a finite number", remedy);
   if (scene.floor && g.x.z < -g.r) return error(place.str(), "fell through the floor", remedy);
@@ -87,17 +95,20 @@ void append_grain(State& s, const GrainRow& g, const Vec3d& rotation, const Load
   s.role.push_back(role);
 }
 
-void append_contact(State& s, const Scene& scene, const Sides& sides, const GrainRow& a, const GrainRow& b, Index i,
-                    Index j, const Spring<double>& spring) {
+// Without friction there is no spring, whatever an earlier stage has left.
+static bool holds_spring(const ContactParameters& p) { return p.k_t > 0 && p.mu_s > 0; }
+
+void append_contact(State& s, const Scene& scene, const Sides& sides, const GrainRow& a, const GrainRow& b,
+                    Index i, Index j, const Spring<double>& spring) {
   if (!(between_grains(nearest_image(sides, a.x - b.x), a.r + b.r, a.r - b.r).delta_n < 0)) return;
-  s.contacts.push_back({i, j, scene.grain.k_t > 0 ? spring.delta_t : Vec3d{}, spring.slipping});
+  s.contacts.push_back({i, j, holds_spring(scene.grain) ? spring.delta_t : Vec3d{}, spring.slipping});
 }
 
-void append_wall_contact(State& s, const Scene& scene, const Drive& drive, const GrainRow& g, Index i, WallName wall,
-                         const Spring<double>& spring) {
+void append_wall_contact(State& s, const Scene& scene, const Drive& drive, const GrainRow& g, Index i,
+                         WallName wall, const Spring<double>& spring) {
   const bool top = wall == WallName::top;
   if (!(at_wall(g.x.z, g.r, top ? drive.wall_z : 0.0, top ? -1.0 : 1.0).delta_n < 0)) return;
-  s.wall_contacts.push_back({i, wall, scene.wall.k_t > 0 ? spring.delta_t : Vec3d{}, spring.slipping});
+  s.wall_contacts.push_back({i, wall, holds_spring(scene.wall) ? spring.delta_t : Vec3d{}, spring.slipping});
 }
 
 void finish_state(State& s, const Drive& d) {

@@ -27,17 +27,20 @@ struct WallAction {
   Vec3d f_viscous, torque_viscous;
 };
 template <Features F>
-MORAINE_HD WallAction wall_action(const ContactParameters& law, double dt, const Drive& drive, const GrainRow& grain,
-                                      const NowRow& now, WallName wall, Spring<double>& spring) {
+MORAINE_HD WallAction wall_action(const ContactParameters& law, double dt, const Drive& drive,
+                                  const GrainRow& grain, const NowRow& now, WallName wall,
+                                  Spring<double>& spring) {
   const bool top = wall == WallName::top;
   const Geometry<double> g = at_wall(grain.x.z, grain.r, top ? drive.wall_z : 0.0, top ? -1.0 : 1.0);
-  const Vec3d still{0, 0, 0}, wall_v{0, 0, top ? drive.wall_v : 0.0}, wall_now{0, 0, top ? drive.wall_v_ahead : 0.0};
+  const Vec3d still{0, 0, 0}, wall_v{0, 0, top ? drive.wall_v : 0.0},
+      wall_now{0, 0, top ? drive.wall_v_ahead : 0.0};
   const Action<double> a = contact_law<F>(law, dt, g, {grain.v - wall_v, grain.omega, still},
                                           {now.v - wall_now, now.omega, still}, spring);
   return {a.f, -g.l_i * a.n_x_f, a.slip, a.f_viscous, -g.l_i * a.n_x_f_viscous};
 }
 
-// The forces of viscous contacts on a grain do this much work at step n, when its velocity is half a step further.
+// The forces of viscous contacts on a grain do this much work at step n, when its velocity is half a step
+// further.
 MORAINE_HD void add_damping_power(Power& power, const GrainRow& g, const Mobility& m, const LoadRow& load,
                                   const LoadRow& damping, double dt) {
   power.add(damping, axpy(0.5 * dt, m.acceleration(load.f), g.v),
@@ -53,14 +56,15 @@ MORAINE_HD bool is_lost(const Scene& scene, const Drive& drive, const GrainRow& 
 }
 Error lost_grain(const Scene& scene, const Drive& drive, const GrainRow& g, Index id);
 
-void half_step_back(GrainRow& grain, const Mobility& mobility, const Vec3d& f, const Vec3d& torque, double dt);
+void half_step_back(GrainRow& grain, const Mobility& mobility, const Vec3d& f, const Vec3d& torque,
+                    double dt);
 
 void append_grain(State& s, const GrainRow& grain, const Vec3d& rotation, const LoadRow& load, Role role);
 // Only if they touch.
-void append_contact(State& s, const Scene& scene, const Sides& sides, const GrainRow& a, const GrainRow& b, Index i,
-                    Index j, const Spring<double>& spring);
-void append_wall_contact(State& s, const Scene& scene, const Drive& drive, const GrainRow& grain, Index i, WallName wall,
-                         const Spring<double>& spring);
+void append_contact(State& s, const Scene& scene, const Sides& sides, const GrainRow& a, const GrainRow& b,
+                    Index i, Index j, const Spring<double>& spring);
+void append_wall_contact(State& s, const Scene& scene, const Drive& drive, const GrainRow& grain, Index i,
+                         WallName wall, const Spring<double>& spring);
 // Sorts the contacts, copies the drive, marks the state staggered.
 void finish_state(State& s, const Drive& drive);
 

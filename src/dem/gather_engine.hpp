@@ -1,9 +1,10 @@
-// The GPU's engine: each grain walks its own contacts and adds up its own force, so no two threads write to one place. Each
-// contact is computed twice, by either grain, from the same numbers in the same order; its spring is kept twice, too.
-// Templated on Space: on the host it gives the same bits as PairEngine, which is how the tests prove this loop without a GPU.
+// The GPU's engine: each grain walks its own contacts and adds up its own force, so no two threads write to
+// one place. Each contact is computed twice, by either grain, from the same numbers in the same order; its
+// spring is kept twice, too. Templated on Space: on the host it gives the same bits as PairEngine, which is
+// how the tests prove this loop without a GPU.
 //
-// The host sends steps in batches and looks only now and then: once the neighbour lists are about to run out, a flag in
-// Control turns all later steps of the batch into nothing, and the host builds new ones.
+// The host sends steps in batches and looks only now and then: once the neighbour lists are about to run out,
+// a flag in Control turns all later steps of the batch into nothing, and the host builds new ones.
 #pragma once
 #include <algorithm>
 #include <memory>
@@ -28,7 +29,7 @@ struct GatherView {
   double margin;
   GrainRow* grain;
   NowRow* now;
-  LoadRow *load, *damping;  // damping: the viscous part, where the ledger asks for it
+  LoadRow *load, *damping;           // damping: the viscous part, where the ledger asks for it
   double *wall_push, *wall_damping;  // N, each grain's force on the top wall; its viscous part
   Vec3d* rotation;
   const Mobility* mobility;
@@ -36,9 +37,9 @@ struct GatherView {
   const std::int64_t* row;
   const Index* neighbour;
   Spring<double>*spring, *wall_spring;
-  Reaction* reaction;        // one for each chunk, as the next two
+  Reaction* reaction;  // one for each chunk, as the next two
   Dissipation* dissipation;
-  double* fastest2;          // by component, m2/s2
+  double* fastest2;  // by component, m2/s2
   Control* control;
 
   MORAINE_HD Index chunks() const { return (n + chunk - 1) / chunk; }
@@ -58,7 +59,10 @@ struct SumChunk {
     for (Index i = static_cast<Index>(c) * w.chunk; i < w.chunk_end(static_cast<Index>(c)); ++i) {
       reaction.wall_force += w.wall_push[i];
       reaction.wall_damping += w.wall_damping[i];
-      if (w.role[i] == Role::top) reaction.shear_force += w.load[i].f.x;
+      if (w.role[i] == Role::top) {
+        reaction.shear_force += w.load[i].f.x;
+        if (w.damping) reaction.layer_damping += w.damping[i].f.x;
+      }
       dissipation.slip += w.load[i].slip;
       if (w.damping) add_damping_power(power, w.grain[i], w.mobility[i], w.load[i], w.damping[i], dt);
     }
@@ -87,6 +91,7 @@ struct AdvanceDrive {
     for (Index k = 0; k < w.chunks(); ++k) {
       reaction.wall_force += w.reaction[k].wall_force, reaction.shear_force += w.reaction[k].shear_force;
       reaction.wall_damping += w.reaction[k].wall_damping;
+      reaction.layer_damping += w.reaction[k].layer_damping;
       dissipation.slip += w.dissipation[k].slip, dissipation.damping_power += w.dissipation[k].damping_power;
     }
   }
@@ -98,16 +103,20 @@ struct Integrate {
   MORAINE_HD void operator()(std::int64_t i) const {
     if (w.control->stale) return;
     GrainRow& g = w.grain[i];
-    if (w.scene.shear.drive == Shear::Drive::stress && w.role[i] == Role::top) g.v.x = w.control->drive.layer_u;
+    if (w.scene.shear.drive == Shear::Drive::stress && w.role[i] == Role::top)
+      g.v.x = w.control->drive.layer_u;
     const Triple dt(Vec3d{w.scene.dt, w.scene.dt, w.scene.dt});
     const Triple acceleration = w.mobility[i].acceleration(w.load[i].f);
     const Triple spin_acceleration = w.mobility[i].spin_acceleration(w.load[i].torque);
     Kinematics<Triple> k{g.x, g.v, g.omega, w.rotation[i]};
     leapfrog(k, acceleration, spin_acceleration, dt);
     g.x = k.x, g.v = k.v, g.omega = k.omega, w.rotation[i] = k.rotation;
-    if constexpr (F.viscous)
+    if constexpr (F.viscous) {
       w.now[i] = {axpy<double>(0.5 * w.scene.dt, acceleration, g.v), 0,
                   axpy<double>(0.5 * w.scene.dt, spin_acceleration, g.omega), 0};
+      if (w.scene.shear.drive == Shear::Drive::stress && w.role[i] == Role::top)
+        w.now[i].v.x = w.control->drive.layer_u_ahead;
+    }
   }
 };
 
@@ -203,7 +212,8 @@ struct FindLost {
   Index* lost;
   MORAINE_HD void operator()(std::int64_t c) const {
     lost[c] = -1;
-    for (Index i = static_cast<Index>(c) * w.chunk; i < w.chunk_end(static_cast<Index>(c)) && lost[c] < 0; ++i)
+    for (Index i = static_cast<Index>(c) * w.chunk; i < w.chunk_end(static_cast<Index>(c)) && lost[c] < 0;
+         ++i)
       if (is_lost(w.scene, w.control->drive, w.grain[i])) lost[c] = i;
   }
 };
@@ -242,7 +252,8 @@ class GatherEngine final : public Engine {
     for (const WallContact& w : s.wall_contacts)
       wall_springs[2 * static_cast<std::size_t>(w.i) + static_cast<int>(w.wall)] = {w.delta_t, w.slipping};
     wall_spring_.set(wall_springs);
-    reaction_.resize(view_.chunks()), dissipation_.resize(view_.chunks()), fastest2_.resize(3 * view_.chunks());
+    reaction_.resize(view_.chunks()), dissipation_.resize(view_.chunks()),
+        fastest2_.resize(3 * view_.chunks());
     lost_.resize(view_.chunks());
     Control control;
     control.drive = drive_of(scene, s);
@@ -323,7 +334,8 @@ class GatherEngine final : public Engine {
     view_.rotation = rotation_.data(), view_.mobility = mobility_.data();
     view_.role = role_.data(), view_.row = lists_.row.data(), view_.neighbour = lists_.neighbour.data();
     view_.spring = spring_.data(), view_.wall_spring = wall_spring_.data(), view_.reaction = reaction_.data();
-    view_.dissipation = dissipation_.data(), view_.fastest2 = fastest2_.data(), view_.control = control_.data();
+    view_.dissipation = dissipation_.data(), view_.fastest2 = fastest2_.data(),
+    view_.control = control_.data();
   }
 
   void search() {
@@ -336,8 +348,9 @@ class GatherEngine final : public Engine {
     std::swap(spring_, old_spring_);
     search();
     spring_.resize(std::max<std::int64_t>(lists_.total, 1));
-    space_.for_each(n_, gather::CarrySprings{old_lists_.row.data(), lists_.row.data(), old_lists_.neighbour.data(),
-                                             lists_.neighbour.data(), old_spring_.data(), spring_.data()});
+    space_.for_each(
+        n_, gather::CarrySprings{old_lists_.row.data(), lists_.row.data(), old_lists_.neighbour.data(),
+                                 lists_.neighbour.data(), old_spring_.data(), spring_.data()});
     refresh_view();
   }
 
@@ -369,14 +382,15 @@ class GatherEngine final : public Engine {
     std::vector<GrainRow> grains = grain_.get();
     std::vector<LoadRow> loads = load_.get();
     for (Index i = 0; i < n_; ++i) {
-      half_step_back(grains[i], mobility(view_.scene, grains[i].r, role_host_[i]), loads[i].f, loads[i].torque,
-                     view_.scene.dt);
+      half_step_back(grains[i], mobility(view_.scene, grains[i].r, role_host_[i]), loads[i].f,
+                     loads[i].torque, view_.scene.dt);
       loads[i].slip = 0;
     }
     grain_.set(grains), load_.set(loads), control_.set({control});
   }
 
-  gather::AdvanceDrive on_host(std::vector<Reaction>& reactions, std::vector<Dissipation>& dissipations) const {
+  gather::AdvanceDrive on_host(std::vector<Reaction>& reactions,
+                               std::vector<Dissipation>& dissipations) const {
     GatherView host = view_;
     host.reaction = reactions.data(), host.dissipation = dissipations.data();
     return {host};

@@ -1,5 +1,5 @@
-// Memory layout of what the contact loop reads and writes for each grain: three and two SIMD rows. Reading and writing
-// are kept apart so that threads never write into what others read.
+// Memory layout of what the contact loop reads and writes for each grain: three and two SIMD rows. Reading
+// and writing are kept apart so that threads never write into what others read.
 #pragma once
 #include <algorithm>
 
@@ -37,7 +37,8 @@ struct alignas(32) LoadRow {
   }
 };
 
-// W, what forces do to moving grains, component by component so that SIMD rows and single grains agree to the last bit.
+// W, what forces do to moving grains, component by component so that SIMD rows and single grains agree to the
+// last bit.
 struct Power {
   Vec3d sum{0, 0, 0};
   MORAINE_HD void add(const LoadRow& load, const Vec3d& v, const Vec3d& omega) {
@@ -46,8 +47,8 @@ struct Power {
   MORAINE_HD double total() const { return sum.x + (sum.y + sum.z); }
 };
 
-// Grains are dealt into chunks of neighbours in memory order: the unit of work of a thread and of every sum. Their number
-// depends on the number of grains alone, so results do not depend on the number of threads.
+// Grains are dealt into chunks of neighbours in memory order: the unit of work of a thread and of every sum.
+// Their number depends on the number of grains alone, so results do not depend on the number of threads.
 inline Index chunk_size(Index grains) {
   const Index sixteenth = (grains / 16 + 63) / 64 * 64;
   return std::clamp<Index>(sixteenth, 128, 1024);
@@ -59,7 +60,8 @@ struct Sides {
   Vec3d side, inverse;
   static Sides of(const Scene& s) {
     const auto along = [](bool periodic, double length) { return periodic ? length : 0.0; };
-    const Vec3d side{along(s.periodic_x, s.box.x), along(s.periodic_y, s.box.y), along(s.periodic_z, s.box.z)};
+    const Vec3d side{along(s.periodic_x, s.box.x), along(s.periodic_y, s.box.y),
+                     along(s.periodic_z, s.box.z)};
     const auto inverse = [](double length) { return length > 0 ? 1 / length : 0.0; };
     return {side, {inverse(side.x), inverse(side.y), inverse(side.z)}};
   }
@@ -67,7 +69,8 @@ struct Sides {
 
 template <class T>
 MORAINE_HD Vec3<T> nearest_image(const Sides& s, const Vec3<T>& d) {
-  return {fma(T(-s.side.x), round(d.x * T(s.inverse.x)), d.x), fma(T(-s.side.y), round(d.y * T(s.inverse.y)), d.y),
+  return {fma(T(-s.side.x), round(d.x * T(s.inverse.x)), d.x),
+          fma(T(-s.side.y), round(d.y * T(s.inverse.y)), d.y),
           fma(T(-s.side.z), round(d.z * T(s.inverse.z)), d.z)};
 }
 

@@ -1,5 +1,6 @@
-// Half-step leapfrog (Damsgaard et al. 2013, par. 23): one grain from step n to n + 1, its velocities from n - 1/2 to n + 1/2.
-// Row: Pack on the CPU (its fourth lane stays untouched where dt holds a zero), Triple elsewhere; dt has it in all lanes.
+// Half-step leapfrog (Damsgaard et al. 2013, par. 23): one grain from step n to n + 1, its velocities from n
+// - 1/2 to n + 1/2. Row: Pack on the CPU (its fourth lane stays untouched where dt holds a zero), Triple
+// elsewhere; dt has it in all lanes.
 #pragma once
 #include "dem/grain.hpp"
 
@@ -12,14 +13,16 @@ struct Triple : Vec3d {
   }
 };
 
-// How a grain answers to forces. Held grains (par. 26) do not move along held directions, do not spin, feel no gravity.
+// How a grain answers to forces. Held grains (par. 26) do not move along held directions, do not spin, feel
+// no gravity.
 struct alignas(32) Mobility {
   double inverse_mass_xy, inverse_mass_z;  // 1/kg
   double gravity;                          // m/s2, along z
   double inverse_inertia;                  // 1/(kg m2)
 
   MORAINE_HD Vec3d acceleration(const Vec3d& f) const {
-    return {fma(f.x, inverse_mass_xy, 0.0), fma(f.y, inverse_mass_xy, 0.0), fma(f.z, inverse_mass_z, gravity)};
+    return {fma(f.x, inverse_mass_xy, 0.0), fma(f.y, inverse_mass_xy, 0.0),
+            fma(f.z, inverse_mass_z, gravity)};
   }
   MORAINE_HD Vec3d spin_acceleration(const Vec3d& torque) const { return inverse_inertia * torque; }
 };
@@ -36,7 +39,8 @@ struct Kinematics {
 };
 
 template <class Row>
-MORAINE_HD void leapfrog(Kinematics<Row>& k, const Row& acceleration, const Row& spin_acceleration, const Row& dt) {
+MORAINE_HD void leapfrog(Kinematics<Row>& k, const Row& acceleration, const Row& spin_acceleration,
+                         const Row& dt) {
   k.v = fma(dt, acceleration, k.v);
   k.x = fma(dt, k.v, k.x);
   k.omega = fma(dt, spin_acceleration, k.omega);

@@ -1,5 +1,6 @@
 // Neighbour search by cells: all pairs closer than r_i + r_j + margin, as rows of neighbours for each grain.
-// Written for any Space (backend/host.hpp, backend/cuda.cuh). The order of each row is fixed, so that sums over it are too.
+// Written for any Space (backend/host.hpp, backend/cuda.cuh). The order of each row is fixed, so that sums
+// over it are too.
 #pragma once
 #include "backend/host.hpp"
 #include "dem/grain.hpp"
@@ -7,8 +8,8 @@
 
 namespace moraine::dem {
 
-// The order in which a grain adds up its contacts: those within its chunk, those with later chunks, those with earlier
-// ones, each by index. It is the order in which PairEngine comes by them.
+// The order in which a grain adds up its contacts: those within its chunk, those with later chunks, those
+// with earlier ones, each by index. It is the order in which PairEngine comes by them.
 struct SumOrder {
   Index chunk;
   MORAINE_HD int rank(Index i, Index j) const { return i / chunk == j / chunk ? 0 : j > i ? 1 : 2; }
@@ -145,8 +146,8 @@ struct Neighbours {
   std::int64_t total = 0;
 
   // half: each pair once, in the row of its lower index. Throws Error if a coordinate is not finite.
-  void build(const Space& space, const Scene& scene, const GrainRow* grains, const Role* role, Index n, double r_max,
-             double margin, bool half) {
+  void build(const Space& space, const Scene& scene, const GrainRow* grains, const Role* role, Index n,
+             double r_max, double margin, bool half) {
     const CellGrid grid = make_grid(space, scene, grains, n, 2 * r_max + margin);
     const std::int32_t cells = grid.n[0] * grid.n[1] * grid.n[2];
     key_.resize(n), order_.resize(n), first_.resize(cells), end_.resize(cells);
@@ -156,8 +157,9 @@ struct Neighbours {
     space.for_each(n, search::CellBounds{key_.data(), n, first_.data(), end_.data()});
 
     count_.resize(n + 1), row.resize(n + 1);
-    search::Rows rows{grid,   grains, role, order_.data(),           first_.data(), end_.data(), margin,
-                      half,   scene.shear.hold_z, {chunk_size(n)}, count_.data(), nullptr,     nullptr};
+    search::Rows rows{grid,          grains,  role,   order_.data(),      first_.data(),
+                      end_.data(),   margin,  half,   scene.shear.hold_z, {chunk_size(n)},
+                      count_.data(), nullptr, nullptr};
     space.write(count_.data() + n, std::int64_t{0});
     space.for_each(n, rows);
     space.exclusive_scan(count_.data(), row.data(), n + 1);

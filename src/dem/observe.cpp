@@ -27,6 +27,11 @@ Velocities at_step(const Scene& scene, const State& s) {
     w.v[i] = axpy(0.5 * scene.dt, m.acceleration(s.force[i]), s.v[i]);
     w.omega[i] = axpy(0.5 * scene.dt, m.spin_acceleration(s.torque[i]), s.omega[i]);
   }
+  if (scene.shear.drive == Shear::Drive::stress) {
+    const double u = drive_of(scene, s).layer_u_now;
+    for (Index i = 0; i < s.size(); ++i)
+      if (s.role[i] == Role::top) w.v[i].x = u;
+  }
   return w;
 }
 
@@ -114,9 +119,11 @@ Observation observe(const Scene& scene, const State& s) {
     normal_force += std::sqrt(dot(c.f_n, c.f_n));
     e.elastic_normal += 0.5 * scene.grain.k_n * c.overlap * c.overlap;
   }
-  for (const Contact& c : s.contacts) e.elastic_tangential += 0.5 * scene.grain.k_t * dot(c.delta_t, c.delta_t);
+  for (const Contact& c : s.contacts)
+    e.elastic_tangential += 0.5 * scene.grain.k_t * dot(c.delta_t, c.delta_t);
   for (const WallForce& w : walls) e.elastic_normal += 0.5 * scene.wall.k_n * w.delta_n * w.delta_n;
-  for (const WallContact& w : s.wall_contacts) e.elastic_tangential += 0.5 * scene.wall.k_t * dot(w.delta_t, w.delta_t);
+  for (const WallContact& w : s.wall_contacts)
+    e.elastic_tangential += 0.5 * scene.wall.k_t * dot(w.delta_t, w.delta_t);
   if (!contacts.empty()) {
     o.mean_overlap /= static_cast<double>(contacts.size());
     o.coordination = 2.0 * static_cast<double>(contacts.size()) / s.size();
@@ -129,7 +136,9 @@ Observation observe(const Scene& scene, const State& s) {
     const Mobility mob = mobility(scene, s.r[i], s.role[i]);
     const double m = sphere_mass(scene.density, s.r[i]), inertia = 0.4 * m * s.r[i] * s.r[i];
     // 1/2 m v(n-1/2).v(n+1/2)
-    const auto before_times_after = [](const Vec3d& before, const Vec3d& at) { return dot(before, at + (at - before)); };
+    const auto before_times_after = [](const Vec3d& before, const Vec3d& at) {
+      return dot(before, at + (at - before));
+    };
     e.kinetic += 0.5 * m * before_times_after(s.v[i], at.v[i]);
     e.rotational += 0.5 * inertia * before_times_after(s.omega[i], at.omega[i]);
     if (s.role[i] != Role::free) continue;

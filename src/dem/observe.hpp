@@ -1,9 +1,10 @@
-// What one reads off a state: macroscopic stresses, geometry, contacts, and the energy balance. Host only, one fixed order of
-// summation, so the same state always gives the same bits.
+// What one reads off a state: macroscopic stresses, geometry, contacts, and the energy balance. Host only,
+// one fixed order of summation, so the same state always gives the same bits.
 //
-// Balance (J): kinetic + elastic + potential + slip + viscous - top_wall - layers = constant within a stage; `residue` is
-// the drift of the left side since the stage began. Kinetic energy at step n is 1/2 m v(n-1/2).v(n+1/2), which
-// leapfrog conserves exactly in a linear spring, so that the residue comes from opening, closing and turning contacts only.
+// Balance (J): kinetic + elastic + potential + slip + viscous - top_wall - layers = constant within a stage;
+// `residue` is the drift of the left side since the stage began. Kinetic energy at step n is 1/2 m
+// v(n-1/2).v(n+1/2), which leapfrog conserves exactly in a linear spring, so that the residue comes from
+// opening, closing and turning contacts only.
 #pragma once
 #include <vector>
 
@@ -13,7 +14,8 @@
 namespace moraine::dem {
 
 struct Energy {
-  double kinetic = 0, rotational = 0, elastic_normal = 0, elastic_tangential = 0, potential = 0, wall_kinetic = 0;
+  double kinetic = 0, rotational = 0, elastic_normal = 0, elastic_tangential = 0, potential = 0,
+         wall_kinetic = 0;
   double total() const {
     return kinetic + rotational + elastic_normal + elastic_tangential + potential + wall_kinetic;
   }
@@ -26,17 +28,18 @@ struct Observation {
   double porosity = 0;       // of the box below `height`
   double mean_overlap = 0, max_overlap = 0;  // m, of grain contacts
   double coordination = 0;                   // contacts per grain, wall contacts not counted
-  double unbalanced_force = 0;  // mean net force on free grains (gravity included) / mean normal contact force
+  double unbalanced_force =
+      0;  // mean net force on free grains (gravity included) / mean normal contact force
   Energy energy;
 };
 Observation observe(const Scene& scene, const State& staggered);
 
 // Grain contacts with their forces at step n, in the order of state.contacts.
 struct ContactForce {
-  Index i, j;     // memory order
-  Vec3d point;    // m
-  Vec3d f_n, f_t; // N, on i
-  double overlap; // m, positive
+  Index i, j;      // memory order
+  Vec3d point;     // m
+  Vec3d f_n, f_t;  // N, on i
+  double overlap;  // m, positive
 };
 std::vector<ContactForce> contact_forces(const Scene& scene, const State& staggered);
 

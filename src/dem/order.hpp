@@ -5,8 +5,9 @@
 
 namespace moraine::dem {
 
-// Wraps positions into the box along periodic sides, sorts the grains along a space-filling curve, and takes contacts
-// along (their springs turn round where i and j change places). Ties go by id, so the result depends on the state alone.
+// Wraps positions into the box along periodic sides, sorts the grains along a space-filling curve, and takes
+// contacts along (their springs turn round where i and j change places). Ties go by id, so the result depends
+// on the state alone.
 void sort_spatially(const Scene& scene, State& state);
 
 }  // namespace moraine::dem

@@ -55,15 +55,18 @@ Lattice make_lattice(const Packing& p) {
   out.cell = p.cell * 2 * r_max;
   out.box_x = p.box_x > 0 ? p.box_x : static_cast<double>(p.columns_x) * out.cell;
   out.box_y = p.box_y > 0 ? p.box_y : static_cast<double>(p.columns_y) * out.cell;
-  const Vec3d cell{out.box_x / static_cast<double>(p.columns_x), out.box_y / static_cast<double>(p.columns_y), out.cell};
+  const Vec3d cell{out.box_x / static_cast<double>(p.columns_x), out.box_y / static_cast<double>(p.columns_y),
+                   out.cell};
   for (const double side : {cell.x, cell.y, cell.z})
     if (side < 2 * margin * r_max)
-      throw error("the grains overlap at the start: a lattice cell is ", side, " m wide and the largest grain needs ",
-                  2 * margin * r_max, " m; expected fewer grains.columns_x/columns_y, a larger box, or grains.cell >= ", margin);
+      throw error("the grains overlap at the start: a lattice cell is ", side,
+                  " m wide and the largest grain needs ", 2 * margin * r_max,
+                  " m; expected fewer grains.columns_x/columns_y, a larger box, or grains.cell >= ", margin);
 
   std::vector<Vec3d> x(p.count);
   for (std::int64_t i = 0; i < p.count; ++i) {
-    const std::int64_t place[3] = {i % p.columns_x, i / p.columns_x % p.columns_y, i / (p.columns_x * p.columns_y)};
+    const std::int64_t place[3] = {i % p.columns_x, i / p.columns_x % p.columns_y,
+                                   i / (p.columns_x * p.columns_y)};
     for (int a = 0; a < 3; ++a) {
       const double free = cell[a] - 2 * margin * r[i];
       x[i][a] = static_cast<double>(place[a]) * cell[a] + margin * r[i] + free * random.uniform();

@@ -1,4 +1,5 @@
-// Grains to begin with: one in each cell of a loose lattice, placed at random in it (Damsgaard et al. 2013, par. 26).
+// Grains to begin with: one in each cell of a loose lattice, placed at random in it (Damsgaard et al. 2013,
+// par. 26).
 #pragma once
 #include <cstdint>
 
@@ -24,7 +25,8 @@ struct Lattice {
   double cell;          // m
 };
 
-// The same grains for the same numbers, wherever it runs. Throws Error where the grains do not fit into their cells.
+// The same grains for the same numbers, wherever it runs. Throws Error where the grains do not fit into their
+// cells.
 Lattice make_lattice(const Packing& packing);
 
 // A state of n grains at rest, all arrays of the right length.

@@ -5,15 +5,15 @@
 #include <limits>
 #include <tuple>
 
-#include "dem/features.hpp"
 #include "dem/engine_parts.hpp"
+#include "dem/features.hpp"
 
 namespace moraine::dem {
 
 namespace {
 
 constexpr Index no_link = -1;
-constexpr int group_block = 32;          // groups of four that go through the three phases together
+constexpr int group_block = 32;  // groups of four that go through the three phases together
 constexpr int steps_between_checks = 256;
 constexpr int steps_near_list_should_last = 40;
 
@@ -25,7 +25,6 @@ template <class Row>
 void set_row(Row& v, Pack p) {
   p.store(reinterpret_cast<double*>(&v));
 }
-Pack without_last(Pack p) { return __builtin_shuffle(p.v, Pack(0.0).v, Pack::Bits{0, 1, 2, 7}); }
 
 }  // namespace
 
@@ -38,7 +37,8 @@ void PairEngine::PairList::add(Index i, Index j, Index target, const Spring<doub
   PairGroup& p = pairs.back();
   p.i[lane] = i, p.j[lane] = j, p.target[lane] = target;
   SpringGroup& g = springs.back();
-  g.x.v[lane] = s.delta_t.x, g.y.v[lane] = s.delta_t.y, g.z.v[lane] = s.delta_t.z, g.slipping.v[lane] = s.slipping;
+  g.x.v[lane] = s.delta_t.x, g.y.v[lane] = s.delta_t.y, g.z.v[lane] = s.delta_t.z,
+  g.slipping.v[lane] = s.slipping;
   ++count;
 }
 
@@ -66,7 +66,8 @@ std::string PairEngine::describe() const {
 #else
   const char* lanes = "portable SIMD";
 #endif
-  return "cpu, " + std::to_string(space_.threads) + (space_.threads == 1 ? " thread, " : " threads, ") + lanes;
+  return "cpu, " + std::to_string(space_.threads) + (space_.threads == 1 ? " thread, " : " threads, ") +
+         lanes;
 }
 
 Engine::Counts PairEngine::counts() const {
@@ -123,7 +124,8 @@ void PairEngine::load(const Scene& scene, const State& s) {
   }
   for (const Contact& contact : s.contacts) {
     Chunk& chunk = chunks_[contact.i / chunk_size_];
-    chunk.near[contact.j < chunk.end ? 0 : 1].add(contact.i, contact.j, contact.j, {contact.delta_t, contact.slipping});
+    chunk.near[contact.j < chunk.end ? 0 : 1].add(contact.i, contact.j, contact.j,
+                                                  {contact.delta_t, contact.slipping});
   }
   for (const WallContact& w : s.wall_contacts)
     chunks_[w.i / chunk_size_].walls.push_back({w.i, w.wall, {w.delta_t, w.slipping}});
@@ -164,8 +166,7 @@ void PairEngine::find_candidates() {
   neighbours_.build(space_, scene_, grain_.data(), role_.data(), n_, r_max_, margin_, /*half=*/true);
   ++counts_.rebuilds;
 
-  std::vector<std::vector<Index>> link_to(chunks_.size());  // for one chunk at a time: chunk -> link
-  std::vector<Index> link_of(chunks_.size(), no_link);
+  std::vector<Index> link_of(chunks_.size(), no_link);  // from the chunk at hand to each other
   links_.clear();
   for (Chunk& chunk : chunks_) {
     chunk.candidates[0].clear(), chunk.candidates[1].clear(), chunk.incoming.clear(), chunk.outgoing.clear();
@@ -198,7 +199,8 @@ void PairEngine::find_candidates() {
     link.first = static_cast<Index>(rows + slots);
     slots += link.size;
   }
-  if (rows + slots > std::numeric_limits<Index>::max()) throw error("too many contacts for 32-bit indices: ", slots);
+  if (rows + slots > std::numeric_limits<Index>::max())
+    throw error("too many contacts for 32-bit indices: ", slots);
   for (Host::Array<LoadRow>* loads : {&load_, &damping_}) {
     if (loads->size() == 0) continue;
     if (rows + slots > loads->size()) {  // keep what grains and dummies have
@@ -239,6 +241,7 @@ Reaction PairEngine::sum_reactions() const {
     sum.wall_force += chunk.reaction.wall_force;
     sum.shear_force += chunk.reaction.shear_force;
     sum.wall_damping += chunk.reaction.wall_damping;
+    sum.layer_damping += chunk.reaction.layer_damping;
   }
   return sum;
 }
@@ -261,7 +264,8 @@ Dissipation PairEngine::pending_dissipation(double dt) const {
     for (Index i = chunk.begin; i < chunk.end; ++i) {
       slip += load_.data()[i].slip;
       if (damping_.size() > 0)
-        add_damping_power(power, grain_.data()[i], mobility_.data()[i], load_.data()[i], damping_.data()[i], dt);
+        add_damping_power(power, grain_.data()[i], mobility_.data()[i], load_.data()[i], damping_.data()[i],
+                          dt);
     }
     sum.slip += slip, sum.damping_power += power.total();
   }
@@ -286,7 +290,8 @@ void PairEngine::rebuild_near(Chunk& chunk, const Drive& drive, double near_marg
         return g.i[q % 4] != c.i ? g.i[q % 4] < c.i : g.j[q % 4] < c.j;
       };
       while (k < old.count && earlier(k)) ++k;
-      const bool known = k < old.count && old.pairs[k / 4].i[k % 4] == c.i && old.pairs[k / 4].j[k % 4] == c.j;
+      const bool known =
+          k < old.count && old.pairs[k / 4].i[k % 4] == c.i && old.pairs[k / 4].j[k % 4] == c.j;
       Index target = c.j;
       if (part == 1) {
         Link& link = links_[c.link];
@@ -307,7 +312,8 @@ void PairEngine::rebuild_near(Chunk& chunk, const Drive& drive, double near_marg
   };
   for (Index i = chunk.begin; i < chunk.end; ++i) {
     if (scene_.floor && grain[i].x.z - grain[i].r < near_margin) add(i, WallName::floor);
-    if (scene_.top_wall.drive != TopWall::Drive::none && drive.wall_z - grain[i].x.z - grain[i].r < near_margin)
+    if (scene_.top_wall.drive != TopWall::Drive::none &&
+        drive.wall_z - grain[i].x.z - grain[i].r < near_margin)
       add(i, WallName::top);
   }
   chunk.walls = std::move(walls);
@@ -319,8 +325,9 @@ void PairEngine::pair_forces(Chunk& chunk, double dt) {
   pair_forces<F>(chunk.near[1], dt);
 }
 
-// Short phases over a block of groups: gather rows and turn them into lanes, the three parts of the law, turn back and
-// add up. One group alone is a long chain of dependent operations; in phases the processor works on several at once.
+// Short phases over a block of groups: gather rows and turn them into lanes, the three parts of the law, turn
+// back and add up. One group alone is a long chain of dependent operations; in phases the processor works on
+// several at once.
 template <Features F>
 void PairEngine::pair_forces(PairList& list, double dt) {
   const GrainRow* const grain = grain_.data();
@@ -377,7 +384,8 @@ void PairEngine::pair_forces(PairList& list, double dt) {
     }
 
     for (int g = 0; g < block; ++g)
-      geometry[g] = between_grains(nearest_image(sides, lanes[g].x_ij), lanes[g].r_sum, lanes[g].r_difference);
+      geometry[g] =
+          between_grains(nearest_image(sides, lanes[g].x_ij), lanes[g].r_sum, lanes[g].r_difference);
 
     if constexpr (F.friction)
       for (int g = 0; g < block; ++g) {
@@ -399,7 +407,8 @@ void PairEngine::pair_forces(PairList& list, double dt) {
     for (int g = 0; g < block; ++g) {
       const PairGroup& p = list.pairs[start + g];
       const Action<Pack>& action = actions[g];
-      const auto scatter = [&](LoadRow* to, const Vec3<Pack>& force, const Vec3<Pack>& n_x_f, const Pack& slip) {
+      const auto scatter = [&](LoadRow* to, const Vec3<Pack>& force, const Vec3<Pack>& n_x_f,
+                               const Pack& slip) {
         Pack f[4] = {force.x, force.y, force.z, slip};
         transpose(f[0], f[1], f[2], f[3]);
         [[maybe_unused]] Pack ti[4], tj[4];
@@ -421,7 +430,8 @@ void PairEngine::pair_forces(PairList& list, double dt) {
         }
       };
       scatter(load, action.f, action.n_x_f, F.ledger ? action.slip : Pack(0.0));
-      if constexpr (F.viscous && F.ledger) scatter(damping_.data(), action.f_viscous, action.n_x_f_viscous, 0.0);
+      if constexpr (F.viscous && F.ledger)
+        scatter(damping_.data(), action.f_viscous, action.n_x_f_viscous, 0.0);
     }
   }
 }
@@ -459,7 +469,10 @@ void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt) {
       chunk.reaction.wall_damping -= a.f_viscous.z;
     }
   }
-  for (const Index i : chunk.top_layer) chunk.reaction.shear_force += load[i].f.x;
+  for (const Index i : chunk.top_layer) {
+    chunk.reaction.shear_force += load[i].f.x;
+    if constexpr (F.viscous && F.ledger) chunk.reaction.layer_damping += damping_.data()[i].f.x;
+  }
 }
 
 template <Features F>
@@ -495,6 +508,9 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive) {
     fastest2 = max(k.v * k.v, fastest2);
     set_row(load.f, zero), set_row(load.torque, zero);
   }
+  if constexpr (F.viscous)
+    if (scene_.shear.drive == Shear::Drive::stress)
+      for (const Index i : chunk.top_layer) now_.data()[i].v.x = drive.layer_u_ahead;
   chunk.dissipation = {sum_f[3], power[0] + (power[1] + power[2])};
   for (int a = 0; a < 3; ++a) chunk.fastest2[a] = fastest2[a];
 }
@@ -507,8 +523,7 @@ void PairEngine::check(Chunk& chunk, const Drive& drive) const {
 
 void PairEngine::report_lost() const {
   for (const Chunk& chunk : chunks_)
-    if (chunk.lost >= 0)
-      throw lost_grain(scene_, course_.drive, grain_.data()[chunk.lost], id_[chunk.lost]);
+    if (chunk.lost >= 0) throw lost_grain(scene_, course_.drive, grain_.data()[chunk.lost], id_[chunk.lost]);
   throw error("internal: no grain is lost");
 }
 
@@ -520,8 +535,8 @@ void PairEngine::evaluate(double dt) {
   for (Chunk& chunk : chunks_) finish<F>(chunk, course_.drive, dt);
 }
 
-// Steps until all are done, or until new candidates are needed (then it is left between integration and forces, and
-// taken up there again with at_forces).
+// Steps until all are done, or until new candidates are needed (then it is left between integration and
+// forces, and taken up there again with at_forces).
 template <Features F>
 PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
   const double dt = scene_.dt;
@@ -561,7 +576,8 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
         }
         if (F.ledger && !closed) drive.account(scene_, sum_dissipation());
         closed = false;
-        if (guard && std::any_of(chunks_.begin(), chunks_.end(), [](const Chunk& c) { return c.lost >= 0; })) {
+        if (guard &&
+            std::any_of(chunks_.begin(), chunks_.end(), [](const Chunk& c) { return c.lost >= 0; })) {
           reason = Pause::lost;
           break;
         }
@@ -594,9 +610,17 @@ void PairEngine::advance(std::int64_t steps) {
   bool at_forces = false;
   while (steps > 0) {
     switch ((this->*run_)(steps, at_forces)) {
-      case Pause::done: break;
-      case Pause::search: find_candidates(); break;
-      case Pause::lost: report_lost();
+      case Pause::done:
+        break;
+      case Pause::search:  // which may come of a number that is no longer finite
+        for (Chunk& chunk : chunks_) {
+          check(chunk, course_.drive);
+          if (chunk.lost >= 0) report_lost();
+        }
+        find_candidates();
+        break;
+      case Pause::lost:
+        report_lost();
     }
   }
 }
@@ -612,7 +636,8 @@ State PairEngine::state() const {
   }
   for (Index i = 0; i < n_; ++i) {
     const Pack& rotation = rotation_.data()[i];
-    append_grain(s, grain_.data()[i], {rotation[0], rotation[1], rotation[2]}, load_.data()[i], role_.data()[i]);
+    append_grain(s, grain_.data()[i], {rotation[0], rotation[1], rotation[2]}, load_.data()[i],
+                 role_.data()[i]);
   }
   for (const Chunk& chunk : chunks_) {
     for (const PairList& list : chunk.near)

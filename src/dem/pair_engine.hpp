@@ -1,9 +1,10 @@
 // The CPU's engine: each pair of near grains once, four at a time in SIMD lanes.
 //
-// Three lists, each drawn from the one before: candidates within the neighbour margin (cells, rebuilt every few thousand
-// steps), near pairs within a much smaller margin (every few dozen), and of these the overlapping ones carry force.
-// Pairs belong to the chunk of their lower grain. A pair across two chunks leaves j's share in a slot that j's chunk
-// collects, so that no two threads write to one place and every sum has one order (grain.hpp, SumOrder).
+// Three lists, each drawn from the one before: candidates within the neighbour margin (cells, rebuilt every
+// few thousand steps), near pairs within a much smaller margin (every few dozen), and of these the
+// overlapping ones carry force. Pairs belong to the chunk of their lower grain. A pair across two chunks
+// leaves j's share in a slot that j's chunk collects, so that no two threads write to one place and every sum
+// has one order (grain.hpp, SumOrder).
 #pragma once
 #include <array>
 #include <memory>
@@ -71,8 +72,8 @@ class PairEngine final : public Engine {
     std::vector<Index> top_layer;
     Reaction reaction;
     Dissipation dissipation;
-    double fastest2[3];           // largest v^2 by component
-    Index lost = -1;              // a grain that went wrong
+    double fastest2[3];  // largest v^2 by component
+    Index lost = -1;     // a grain that went wrong
   };
   // Each thread's own copy of what all agree on.
   struct Course {
@@ -121,9 +122,9 @@ class PairEngine final : public Engine {
   std::vector<Chunk> chunks_;
   std::vector<Link> links_;
   Host::Array<Index> slot_owner_;
-  Host::Array<GrainRow> grain_;  // n grains, then two dummies for each chunk
-  Host::Array<NowRow> now_;      // viscous only
-  Host::Array<LoadRow> load_;    // n grains, dummies, slots
+  Host::Array<GrainRow> grain_;   // n grains, then two dummies for each chunk
+  Host::Array<NowRow> now_;       // viscous only
+  Host::Array<LoadRow> load_;     // n grains, dummies, slots
   Host::Array<LoadRow> damping_;  // the viscous part of it, where the ledger asks for it
   Host::Array<Pack> rotation_;
   Host::Array<Mobility> mobility_;

@@ -1,8 +1,9 @@
-// A checked description of one stage: what surrounds the grains and what drives them. Constant while the stage runs.
+// A checked description of one stage: what surrounds the grains and what drives them. Constant while the
+// stage runs.
 //
-// Signs, for the whole code: x is the shear direction, z points up, gravity acts along -z. Stresses are positive in
-// compression. An overlap is a negative delta_n. A force "on the wall" by the grains is positive upwards.
-// SI units everywhere; J, N, Pa, m, s, kg.
+// Signs, for the whole code: x is the shear direction, z points up, gravity acts along -z. Stresses are
+// positive in compression. An overlap is a negative delta_n. A force "on the wall" by the grains is positive
+// upwards. SI units everywhere; J, N, Pa, m, s, kg.
 #pragma once
 #include <cmath>
 #include <numbers>
@@ -60,7 +61,8 @@ struct Scene {
   // Normal stress asked of the top wall, Pa; t in s since the stage began.
   MORAINE_HD double normal_stress(double t) const {
     const TopWall& w = top_wall;
-    return w.sigma_0 + (w.amplitude != 0 ? w.amplitude * ::sin(2 * std::numbers::pi * w.frequency * t + w.phase) : 0);
+    return w.sigma_0 +
+           (w.amplitude != 0 ? w.amplitude * ::sin(2 * std::numbers::pi * w.frequency * t + w.phase) : 0);
   }
 };
 

@@ -1,8 +1,8 @@
 // The grains and all that must be known to go on from here with the same bits.
 //
-// Grains stand in "memory order" (spatially sorted, see order.hpp); `id` tells whose row it is. Within a stage the state is
-// staggered (leapfrog): positions, springs and forces belong to step n, velocities and spins to n - 1/2. Between stages
-// it is not: velocities and spins belong to n.
+// Grains stand in "memory order" (spatially sorted, see order.hpp); `id` tells whose row it is. Within a
+// stage the state is staggered (leapfrog): positions, springs and forces belong to step n, velocities and
+// spins to n - 1/2. Between stages it is not: velocities and spins belong to n.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -32,23 +32,23 @@ struct WallContact {
 
 // Energy that has passed since the stage began, J. See observe.hpp for the balance.
 struct Ledger {
-  double slip = 0;     // dissipated by sliding friction
-  double viscous = 0;  // dissipated by gamma_n, gamma_t
-  double top_wall = 0; // work done on the grains and the wall by the load
-  double layers = 0;   // work done on the grains by the driven layers
+  double slip = 0;           // dissipated by sliding friction
+  double viscous = 0;        // dissipated by gamma_n, gamma_t
+  double top_wall = 0;       // work done on the grains and the wall by the load
+  double layers = 0;         // work done on the grains by the driven layers
   double viscous_power = 0;  // W, at the present step
 };
 
 struct State {
-  std::vector<Index> id;                   // 0 .. N-1, the row in every output file
-  std::vector<double> r;                   // m
-  std::vector<Vec3d> x;                    // m; not wrapped into the box while a stage runs
-  std::vector<Vec3d> v;                    // m/s
-  std::vector<Vec3d> omega;                // rad/s
-  std::vector<Vec3d> rotation;             // rad, integral of omega (par. 45)
-  std::vector<Vec3d> force;                // N, by contacts with grains and walls at step n; without gravity
-  std::vector<Vec3d> torque;               // N m
-  std::vector<Vec3d> x_start;              // m, where the displacement is counted from
+  std::vector<Index> id;        // 0 .. N-1, the row in every output file
+  std::vector<double> r;        // m
+  std::vector<Vec3d> x;         // m; not wrapped into the box while a stage runs
+  std::vector<Vec3d> v;         // m/s
+  std::vector<Vec3d> omega;     // rad/s
+  std::vector<Vec3d> rotation;  // rad, integral of omega (par. 45)
+  std::vector<Vec3d> force;     // N, by contacts with grains and walls at step n; without gravity
+  std::vector<Vec3d> torque;    // N m
+  std::vector<Vec3d> x_start;   // m, where the displacement is counted from
   std::vector<Role> role;
   std::vector<Contact> contacts;           // overlapping pairs, sorted by (i, j)
   std::vector<WallContact> wall_contacts;  // sorted by (wall, i)
@@ -60,7 +60,7 @@ struct State {
   double layer_u = 0;      // m/s, velocity of the top layer
   Ledger ledger;
 
-  std::int64_t step = 0;   // steps since the stage began; t = step dt
+  std::int64_t step = 0;  // steps since the stage began; t = step dt
   bool staggered = false;
 
   Index size() const { return static_cast<Index>(r.size()); }

@@ -36,6 +36,12 @@ MORAINE_HD Vec3<T> axpy(const T& s, const Vec3<T>& a, const Vec3<T>& b) {
   return {fma(s, a.x, b.x), fma(s, a.y, b.y), fma(s, a.z, b.z)};
 }
 
+// b - s a
+template <class T>
+MORAINE_HD Vec3<T> less(const Vec3<T>& b, const T& s, const Vec3<T>& a) {
+  return {fnma(s, a.x, b.x), fnma(s, a.y, b.y), fnma(s, a.z, b.z)};
+}
+
 using Vec3d = Vec3<double>;
 
 }  // namespace moraine::dem

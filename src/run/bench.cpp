@@ -22,15 +22,19 @@ void bench_case(const Options& options, const std::string& stage_name, std::int6
   engine->advance(std::min<std::int64_t>(100, steps));  // warm caches and lists
   const auto began = std::chrono::steady_clock::now();
   engine->advance(steps);
-  const double ms = 1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count() / steps;
+  const double ms =
+      1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count() / steps;
   const auto counts = engine->counts();
   const dem::State end = engine->state();
-  std::printf("{\"program\": \"moraine %s\", \"backend\": \"%s\", \"threads\": %d, \"stage\": \"%s\", \"steps\": %lld, "
-              "\"grains\": %d, \"contacts\": %zu, \"pairs\": %lld, \"near_pairs\": %lld, \"ms_per_step\": %.6g, "
-              "\"particle_steps_per_s\": %.6g}\n",
-              MORAINE_VERSION, engine->describe().c_str(), engine->threads(), stage.name.c_str(),
-              static_cast<long long>(steps), end.size(), end.contacts.size(), static_cast<long long>(counts.candidates),
-              static_cast<long long>(counts.near), ms, end.size() / ms * 1e3);
+  std::printf(
+      "{\"program\": \"moraine %s\", \"backend\": \"%s\", \"threads\": %d, \"stage\": \"%s\", \"steps\": "
+      "%lld, "
+      "\"grains\": %d, \"contacts\": %zu, \"pairs\": %lld, \"near_pairs\": %lld, \"ms_per_step\": %.6g, "
+      "\"particle_steps_per_s\": %.6g}\n",
+      MORAINE_VERSION, engine->describe().c_str(), engine->threads(), stage.name.c_str(),
+      static_cast<long long>(steps), end.size(), end.contacts.size(),
+      static_cast<long long>(counts.candidates), static_cast<long long>(counts.near), ms,
+      end.size() / ms * 1e3);
 }
 
 }  // namespace moraine::run

@@ -41,9 +41,11 @@ void check_case(const Options& options) {
   const double settled = volume / 0.6 / area;  // m, at a porosity of 0.4
 
   std::printf("%s\n", c.title.empty() ? c.directory.string().c_str() : c.title.c_str());
-  std::printf("  grains        %.0f, mean diameter %.4g m, box %.4g x %.4g m, bed about %.3g m (porosity 0.4)\n", n, diameter,
-              start.box_x, start.box_y, settled);
-  // Records, rotation, mobility, some 3.5 candidates and near pairs a grain with springs, and the state kept for output.
+  std::printf(
+      "  grains        %.0f, mean diameter %.4g m, box %.4g x %.4g m, bed about %.3g m (porosity 0.4)\n", n,
+      diameter, start.box_x, start.box_y, settled);
+  // Records, rotation, mobility, some 3.5 candidates and near pairs a grain with springs, and the state kept
+  // for output.
   std::printf("  memory        about %.0f MB\n", n * 2200 / 1e6 + 20);
 
   double total = 0, ms = 0;
@@ -64,15 +66,17 @@ void check_case(const Options& options) {
     total += steps * ms / 1e3;
     const double critical = step_by_eq_9(scene, s, 2.0);  // 2/omega_0, par. 23
     std::printf("  stage %zu: %s\n", k + 1, wanted.name.c_str());
-    std::printf("    step        %.4g s, %.3g of the two-body limit 2/omega_0; %.0f steps for %.4g s\n", scene.dt,
-                scene.dt / critical, steps, duration);
+    std::printf("    step        %.4g s, %.3g of the two-body limit 2/omega_0; %.0f steps for %.4g s\n",
+                scene.dt, scene.dt / critical, steps, duration);
     if (wanted.normal_stress > 0) {
       const double r = 0.5 * diameter;
-      std::printf("    stiffness   k_n/(sigma_0 d) = %.3g%s\n", c.k_n / (wanted.normal_stress * diameter),
-                  c.k_n / (wanted.normal_stress * diameter) < 1e4 ? "  (below 1e4: softer than rigid grains)" : "");
+      std::printf(
+          "    stiffness   k_n/(sigma_0 d) = %.3g%s\n", c.k_n / (wanted.normal_stress * diameter),
+          c.k_n / (wanted.normal_stress * diameter) < 1e4 ? "  (below 1e4: softer than rigid grains)" : "");
       if (strain_rate != 0) {
         const double inertia = std::abs(strain_rate) * r * std::sqrt(c.grains.density / wanted.normal_stress);
-        std::printf("    inertia     I = %.3g (eq. 1)%s\n", inertia, inertia > 1e-3 ? "  (above 1e-3: not pseudo-static)" : "");
+        std::printf("    inertia     I = %.3g (eq. 1)%s\n", inertia,
+                    inertia > 1e-3 ? "  (above 1e-3: not pseudo-static)" : "");
       }
     }
     std::printf("    time        about %s at %.3g ms a step\n", readable_time(steps * ms / 1e3).c_str(), ms);

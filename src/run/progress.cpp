@@ -52,7 +52,8 @@ void Progress::say(const std::string& line) {
 
 void Progress::log(const std::string& lines) { log_ << lines << std::flush; }
 
-void Progress::begin(const std::string& stage, std::int64_t step, std::int64_t steps, std::int64_t later_steps) {
+void Progress::begin(const std::string& stage, std::int64_t step, std::int64_t steps,
+                     std::int64_t later_steps) {
   stage_ = stage, first_step_ = step, steps_ = steps, later_steps_ = later_steps;
   began_ = shown_ = Clock::now();
 }
@@ -63,9 +64,10 @@ void Progress::show(const Now& now) {
   const double stage_left = static_cast<double>(steps_ - now.step) / rate;
   const double left = stage_left + static_cast<double>(later_steps_) / rate;
   char text[256];
-  std::snprintf(text, sizeof text, "%-12s t = %-9.4g s %5.1f %%  %8.0f steps/s  ETA %s (all: %s)  unbalanced force %.2g",
-                stage_.c_str(), now.time, 100.0 * static_cast<double>(now.step) / static_cast<double>(steps_), rate,
-                readable_time(stage_left).c_str(), readable_time(left).c_str(), now.unbalanced_force);
+  std::snprintf(text, sizeof text,
+                "%-12s t = %-9.4g s %5.1f %%  %8.0f steps/s  ETA %s (all: %s)  unbalanced force %.2g",
+                stage_.c_str(), now.time, 100.0 * static_cast<double>(now.step) / static_cast<double>(steps_),
+                rate, readable_time(stage_left).c_str(), readable_time(left).c_str(), now.unbalanced_force);
   if (terminal_)
     std::cerr << "\r\033[K" << text << std::flush;
   else

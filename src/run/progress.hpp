@@ -1,4 +1,5 @@
-// What a person sees while a run goes on: one line that refreshes on a terminal, plain lines elsewhere, and log.txt.
+// What a person sees while a run goes on: one line that refreshes on a terminal, plain lines elsewhere, and
+// log.txt.
 #pragma once
 #include <chrono>
 #include <filesystem>

@@ -15,11 +15,14 @@ double layer_displacement(const dem::State& s) {
   return 0;
 }
 
-bool shears(cases::Stage::Kind k) { return k == cases::Stage::Kind::shear || k == cases::Stage::Kind::shear_stress; }
+bool shears(cases::Stage::Kind k) {
+  return k == cases::Stage::Kind::shear || k == cases::Stage::Kind::shear_stress;
+}
 
 }  // namespace
 
-output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, double time_0, double energy_0) {
+output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, double time_0,
+                   double energy_0) {
   const dem::Observation o = dem::observe(stage.scene, s);
   const dem::Energy& e = o.energy;
   const dem::Ledger& l = s.ledger;
@@ -74,8 +77,10 @@ double energy_put_in(const std::vector<output::Row>& rows) {
 
 std::string summary(const std::vector<cases::Stage>& stages, const std::vector<output::Row>& rows) {
   std::string out =
-      "stage         end time  height  porosity  contacts/  friction  friction  friction  dilation  ledger    residue/\n"
-      "              s         m       1         grain      peak      (smooth)  ultimate  diameters residue J energy in\n";
+      "stage         end time  height  porosity  contacts/  friction  friction  friction  dilation  ledger   "
+      " residue/\n"
+      "              s         m       1         grain      peak      (smooth)  ultimate  diameters residue "
+      "J energy in\n";
   double all_in = 0, all_residue = 0;
   for (std::size_t k = 0; k < stages.size(); ++k) {
     std::vector<output::Row> own;
@@ -86,21 +91,23 @@ std::string summary(const std::vector<cases::Stage>& stages, const std::vector<o
     char text[256], strength[64] = "-         -         -         -         ";
     if (shears(stages[k].kind)) {
       const Strength s = strength_of(own);
-      std::snprintf(strength, sizeof strength, "%-10.3f%-10.3f%-10.3f%-+10.3f", s.peak, s.smoothed_peak, s.ultimate,
-                    s.dilation_diameters);
+      std::snprintf(strength, sizeof strength, "%-10.3f%-10.3f%-10.3f%-+10.3f", s.peak, s.smoothed_peak,
+                    s.ultimate, s.dilation_diameters);
     }
     const double in = energy_put_in(own);
-    std::snprintf(text, sizeof text, "%-14s%-10.4g%-8.4f%-10.4f%-11.3f%s%-+10.1e%.1e\n", stages[k].name.c_str(),
-                  last.time, last.height, last.porosity, last.coordination, strength, last.residue,
-                  in > 0 ? std::abs(last.residue) / in : 0.0);
+    std::snprintf(text, sizeof text, "%-14s%-10.4g%-8.4f%-10.4f%-11.3f%s%-+10.1e%.1e\n",
+                  stages[k].name.c_str(), last.time, last.height, last.porosity, last.coordination, strength,
+                  last.residue, in > 0 ? std::abs(last.residue) / in : 0.0);
     out += text;
     all_in += in, all_residue += last.residue;
   }
   char text[128];
-  std::snprintf(text, sizeof text, "%-93s%-+10.1e%.1e\n", "all", all_residue, all_in > 0 ? std::abs(all_residue) / all_in : 0.0);
+  std::snprintf(text, sizeof text, "%-93s%-+10.1e%.1e\n", "all", all_residue,
+                all_in > 0 ? std::abs(all_residue) / all_in : 0.0);
   out += text;
   return out +
-         "peak: largest value; smooth: largest mean over a shear strain of 0.02; ultimate: mean over the last third of the strain\n"
+         "peak: largest value; smooth: largest mean over a shear strain of 0.02; ultimate: mean over the "
+         "last third of the strain\n"
          "energy in: work of wall and driven layer, and what the grains fell\n";
 }
 

@@ -9,7 +9,8 @@
 namespace moraine::run {
 
 // energy_0: the total when the stage began, J; time_0: s, when the stage began.
-output::Row row_of(std::size_t index, const Stage& stage, const dem::State& state, double time_0, double energy_0);
+output::Row row_of(std::size_t index, const Stage& stage, const dem::State& state, double time_0,
+                   double energy_0);
 
 // How the friction curve of a shear stage is read.
 //   peak: the largest value; smoothed_peak: of the mean over a window of shear strain 0.02

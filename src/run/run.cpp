@@ -39,23 +39,27 @@ void make_directories(const fs::path& path) {
 class Runner {
  public:
   explicit Runner(const Options& options)
-      : options_(options), case_(cases::load(options.directory, options.overrides)), files_{case_.directory / "output"} {}
+      : options_(options),
+        case_(cases::load(options.directory, options.overrides)),
+        files_{case_.directory / "output"} {}
 
   void run() {
+    start_ = start_of(case_);  // with the engine, before anything of an earlier run is touched
+    engine_ = dem::make_engine(options_.backend, options_.threads);
     const bool resuming = settle_old_output();
     if (resuming && now_.finished) {
       std::cerr << files_.checkpoint().string() << ": the case has finished already\n";
       std::cout << summary(case_.stages, now_.rows);
       return;
     }
-    engine_ = dem::make_engine(options_.backend, options_.threads);
     make_directories(files_.snapshots());
     progress_ = std::make_unique<Progress>(files_.log(), resuming, options_.quiet);
     try {
       run_stages(resuming);
     } catch (const Error& e) {
       const bool kept = fs::exists(files_.checkpoint());
-      const std::string after = kept ? "; the last good checkpoint stays in " + files_.checkpoint().string() : "";
+      const std::string after =
+          kept ? "; the last good checkpoint stays in " + files_.checkpoint().string() : "";
       progress_->say(std::string("stopped: ") + e.what() + after);
       throw error(e.what(), after);
     }
@@ -66,23 +70,28 @@ class Runner {
   bool settle_old_output() {
     const bool found = fs::exists(files_.checkpoint()) || fs::exists(files_.series());
     if (options_.force) {
-      for (const fs::path& p : files_.all()) fs::remove_all(p);
+      for (const fs::path& p : files_.all()) {
+        std::error_code failed;
+        fs::remove_all(p, failed);
+        if (failed && failed != std::errc::not_a_directory)
+          throw error(p.string(), ": cannot be removed: ", failed.message());
+      }
       return false;
     }
     if (!found) return false;
     if (!options_.resume)
-      throw error(files_.output.string(), ": holds the results of an earlier run; use --resume to go on from its checkpoint, or "
+      throw error(files_.output.string(),
+                  ": holds the results of an earlier run; use --resume to go on from its checkpoint, or "
                   "--force to replace it");
     if (!fs::exists(files_.checkpoint())) return false;  // cut off before its first checkpoint
     now_ = output::read_checkpoint(files_.checkpoint());
     if (now_.case_text != case_.resolved)
-      throw error(files_.checkpoint().string(), ": belongs to another version of this case (see ", files_.resolved().string(),
-                  "); undo the change, or use --force to run anew");
+      throw error(files_.checkpoint().string(), ": belongs to another version of this case (see ",
+                  files_.resolved().string(), "); undo the change, or use --force to run anew");
     return true;
   }
 
   void run_stages(bool resuming) {
-    start_ = start_of(case_);
     if (!resuming) {
       now_.case_text = case_.resolved;
       now_.state = start_.state;
@@ -91,11 +100,12 @@ class Runner {
     const std::string header = "# moraine " MORAINE_VERSION ", " + engine_->describe() + ", seed " +
                                std::to_string(case_.grains.seed) + "\n";
     output::write_text(files_.resolved(), header + case_.resolved);
-    progress_->say((resuming ? "resumed: " : "") + case_.title + ": " + std::to_string(start_.state.size()) + " grains, " +
-                   engine_->describe());
+    progress_->say((resuming ? "resumed: " : "") + case_.title + ": " + std::to_string(start_.state.size()) +
+                   " grains, " + engine_->describe());
     series_ = std::make_unique<output::Series>(files_.series(), now_.rows);
 
-    for (auto k = static_cast<std::size_t>(now_.stage); k < case_.stages.size(); ++k) run_stage(k, resuming), resuming = false;
+    for (auto k = static_cast<std::size_t>(now_.stage); k < case_.stages.size(); ++k)
+      run_stage(k, resuming), resuming = false;
     now_.finished = true;
     save();
     series_.reset();
@@ -124,8 +134,8 @@ class Runner {
       if (index == 0) save();
     }
     char text[200];
-    std::snprintf(text, sizeof text, "stage %s: %lld steps of %.3g s", stage.name.c_str(), static_cast<long long>(stage.steps),
-                  stage.scene.dt);
+    std::snprintf(text, sizeof text, "stage %s: %lld steps of %.3g s", stage.name.c_str(),
+                  static_cast<long long>(stage.steps), stage.scene.dt);
     progress_->say(text);
     std::int64_t step = now_.state.step;
     progress_->begin(stage.name, step, stage.steps, 0);
@@ -133,7 +143,8 @@ class Runner {
     std::int64_t slice = 64;  // steps between looks at the clock
     while (step < stage.steps) {
       const auto next = [&](std::int64_t every) { return (step / every + 1) * every; };
-      const std::int64_t event = std::min<std::int64_t>({next(stage.series_every), next(stage.snapshot_every), stage.steps});
+      const std::int64_t event =
+          std::min<std::int64_t>({next(stage.series_every), next(stage.snapshot_every), stage.steps});
       const std::int64_t until = std::min(event, step + slice);
       const auto began = std::chrono::steady_clock::now();
       engine_->advance(until - step);
@@ -151,19 +162,22 @@ class Runner {
         if (step != event) now_.state = engine_->state();
         save();
       }
-      if (stop) throw error("interrupted at step ", step, " of stage ", stage.name, "; --resume goes on from here");
+      if (stop)
+        throw error("interrupted at step ", step, " of stage ", stage.name, "; --resume goes on from here");
     }
   }
 
   void record(const Stage& stage) {
-    now_.rows.push_back(row_of(static_cast<std::size_t>(now_.stage), stage, now_.state, now_.stage_start_time, now_.energy_0));
+    now_.rows.push_back(row_of(static_cast<std::size_t>(now_.stage), stage, now_.state, now_.stage_start_time,
+                               now_.energy_0));
     series_->append(now_.rows.back());
   }
 
   void snapshot(const Stage& stage) {
     char name[80];
-    std::snprintf(name, sizeof name, "%02d-%s-%06lld", static_cast<int>(now_.stage) + 1, stage.name.c_str(),
-                  static_cast<long long>((now_.state.step + stage.snapshot_every - 1) / stage.snapshot_every));
+    std::snprintf(
+        name, sizeof name, "%02d-%s-%06lld", static_cast<int>(now_.stage) + 1, stage.name.c_str(),
+        static_cast<long long>((now_.state.step + stage.snapshot_every - 1) / stage.snapshot_every));
     now_.snapshots.push_back(
         output::write_snapshot(files_.snapshots(), name, now_.rows.back().time, stage.scene, now_.state));
     output::write_xdmf(files_.snapshots(), now_.snapshots);

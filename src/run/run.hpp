@@ -23,8 +23,8 @@ void run_case(const Options& options);
 // Prints what run_case would do.
 void check_case(const Options& options);
 
-// Runs so many steps of one stage (the first unless named), straight from the start of the case and without output, and
-// prints one line of JSON.
+// Runs so many steps of one stage (the first unless named), straight from the start of the case and without
+// output, and prints one line of JSON.
 void bench_case(const Options& options, const std::string& stage, std::int64_t steps);
 
 }  // namespace moraine::run

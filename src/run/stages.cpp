@@ -28,7 +28,8 @@ double default_wall_mass(const cases::Case& c, double grains, double cell) {
   return 0.001 * c.grains.density * grains * std::numbers::pi * std::pow(cell / 2, 3);
 }
 
-// par. 26: the lowest and the highest layer, by grain centres. They keep their part through several shear stages.
+// par. 26: the lowest and the highest layer, by grain centres. They keep their part through several shear
+// stages.
 void choose_layers(const cases::Stage& stage, dem::State& s) {
   if (std::any_of(s.role.begin(), s.role.end(), [](dem::Role r) { return r != dem::Role::free; })) return;
   const double largest = 2 * *std::max_element(s.r.begin(), s.r.end());
@@ -41,7 +42,8 @@ void choose_layers(const cases::Stage& stage, dem::State& s) {
   s.x_start = s.x;  // displacement counts from here
 }
 
-void set_top_wall(const cases::Case& c, const cases::Stage& stage, const Start& start, dem::Scene& scene, dem::State& s) {
+void set_top_wall(const cases::Case& c, const cases::Stage& stage, const Start& start, dem::Scene& scene,
+                  dem::State& s) {
   using Wanted = cases::Stage::TopWall;
   using dem::TopWall;
   Wanted wanted = stage.top_wall;
@@ -97,7 +99,8 @@ Start start_of(const cases::Case& c) {
   const cases::Grains& g = c.grains;
   dem::Packing p;
   p.count = g.count;
-  p.distribution = g.distribution == "uniform" ? dem::Packing::Distribution::uniform : dem::Packing::Distribution::lognormal;
+  p.distribution = g.distribution == "uniform" ? dem::Packing::Distribution::uniform
+                                               : dem::Packing::Distribution::lognormal;
   p.radius_mean = g.radius_mean, p.radius_std = g.radius_std;
   p.radius_min = g.radius_min, p.radius_max = g.radius_max;
   p.seed = g.seed, p.columns_x = g.columns_x, p.columns_y = g.columns_y, p.cell = g.cell;
@@ -107,7 +110,8 @@ Start start_of(const cases::Case& c) {
   return {std::move(lattice.state), lattice.box_x, lattice.box_y, c.box_z, wall_mass};
 }
 
-Stage describe(const cases::Case& c, std::size_t index, const dem::Scene& scene, double height_0, const dem::State& state) {
+Stage describe(const cases::Case& c, std::size_t index, const dem::Scene& scene, double height_0,
+               const dem::State& state) {
   const cases::Stage& stage = c.stages.at(index);
   Stage out;
   out.name = stage.name, out.kind = stage.kind, out.scene = scene, out.height_0 = height_0;

@@ -1,5 +1,5 @@
-// From a checked case to what the engine needs: the grains at the start, and for each stage its scene, its number of steps,
-// and the state made ready (Damsgaard et al. 2013, par. 26).
+// From a checked case to what the engine needs: the grains at the start, and for each stage its scene, its
+// number of steps, and the state made ready (Damsgaard et al. 2013, par. 26).
 #pragma once
 #include <string>
 
@@ -10,7 +10,7 @@
 namespace moraine::run {
 
 struct Start {
-  dem::State state;  // velocities at the step, not staggered
+  dem::State state;            // velocities at the step, not staggered
   double box_x, box_y, box_z;  // m
   double wall_mass;            // kg
 };
@@ -23,18 +23,19 @@ struct Stage {
   dem::Scene scene;
   std::int64_t steps;
   std::int64_t series_every, snapshot_every;  // steps
-  double height_0;   // m
-  double diameter;   // m, mean of the grains
-  double strain_rate;  // 1/s, nominal: u/H_0, or axial
+  double height_0;                            // m
+  double diameter;                            // m, mean of the grains
+  double strain_rate;                         // 1/s, nominal: u/H_0, or axial
 };
 
-// Makes `state` ready for stage `index` of the case and returns what drives it. `start` gives box and wall mass.
+// Makes `state` ready for stage `index` of the case and returns what drives it. `start` gives box and wall
+// mass.
 Stage prepare(const cases::Case& c, std::size_t index, const Start& start, dem::State& state);
 // The same without touching a state that is under way already (after a restart).
 Stage describe(const cases::Case& c, std::size_t index, const dem::Scene& scene, double height_0,
                const dem::State& state);
 
-double mean_diameter(const dem::State& s);                              // m
+double mean_diameter(const dem::State& s);                                    // m
 double step_by_eq_9(const dem::Scene& scene, const dem::State& s, double f);  // s
 
 }  // namespace moraine::run

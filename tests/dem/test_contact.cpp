@@ -8,8 +8,8 @@
 namespace moraine::dem {
 namespace {
 
-constexpr Features plain{true, false, false, true}, softening{true, false, true, true}, viscous{true, true, false, true},
-    everything{true, true, true, true};
+constexpr Features plain{true, false, false, true}, softening{true, false, true, true},
+    viscous{true, true, false, true}, everything{true, true, true, true};
 constexpr double k = 1e5, r = 0.01;
 
 class Random {
@@ -51,7 +51,8 @@ void expect_lanes_equal_doubles() {
     for (Input& one : q) one = any_input(random);
     const auto lanes = [&](auto value) { return Pack(value(q[0]), value(q[1]), value(q[2]), value(q[3])); };
     const auto vectors = [&](auto value) {
-      return Vec3<Pack>{lanes([&](const Input& i) { return value(i).x; }), lanes([&](const Input& i) { return value(i).y; }),
+      return Vec3<Pack>{lanes([&](const Input& i) { return value(i).x; }),
+                        lanes([&](const Input& i) { return value(i).y; }),
                         lanes([&](const Input& i) { return value(i).z; })};
     };
     const auto motion = [&](Motion<double> Input::*m) {
@@ -64,16 +65,25 @@ void expect_lanes_equal_doubles() {
                                         lanes([](const Input& i) { return i.r_i - i.r_j; }));
     Spring<Pack> spring{vectors([](const Input& i) { return i.spring.delta_t; }),
                         lanes([](const Input& i) { return i.spring.slipping; })};
-    const Action<Pack> a = contact_law<F, Pack>(law, dt, g, motion(&Input::before), motion(&Input::now), spring);
+    const Action<Pack> a =
+        contact_law<F, Pack>(law, dt, g, motion(&Input::before), motion(&Input::now), spring);
 
     for (int l = 0; l < 4; ++l) {
       Spring<double> s = q[l].spring;
       const auto g1 = between_grains(q[l].x, q[l].r_i + q[l].r_j, q[l].r_i - q[l].r_j);
       const Action<double> b = contact_law<F>(law, dt, g1, q[l].before, q[l].now, s);
-      const double got[] = {a.f.x[l],     a.f.y[l],     a.f.z[l], a.n_x_f.x[l], a.n_x_f.y[l],
-                            a.n_x_f.z[l], a.slip[l],    spring.delta_t.x[l],
-                            spring.delta_t.y[l],        spring.delta_t.z[l], spring.slipping[l]};
-      const double expected[] = {b.f.x,     b.f.y,       b.f.z,       b.n_x_f.x,   b.n_x_f.y, b.n_x_f.z,
+      const double got[] = {a.f.x[l],
+                            a.f.y[l],
+                            a.f.z[l],
+                            a.n_x_f.x[l],
+                            a.n_x_f.y[l],
+                            a.n_x_f.z[l],
+                            a.slip[l],
+                            spring.delta_t.x[l],
+                            spring.delta_t.y[l],
+                            spring.delta_t.z[l],
+                            spring.slipping[l]};
+      const double expected[] = {b.f.x,  b.f.y,       b.f.z,       b.n_x_f.x,   b.n_x_f.y, b.n_x_f.z,
                                  b.slip, s.delta_t.x, s.delta_t.y, s.delta_t.z, s.slipping};
       for (int c = 0; c < 11; ++c) ASSERT_EQ(std::memcmp(&got[c], &expected[c], 8), 0) << "component " << c;
     }
@@ -89,7 +99,8 @@ TEST(ContactLaw, LanesOfAPackGiveTheBitsOfDoubles) {
   expect_lanes_equal_doubles<Features{false, true, false, true}>();
 }
 
-// Whatever moves: no pull, no more friction than mu_s allows, no force and no memory when open, no negative slip.
+// Whatever moves: no pull, no more friction than mu_s allows, no force and no memory when open, no negative
+// slip.
 TEST(ContactLaw, StaysWithinItsLimits) {
   Random random(12);
   const ContactParameters law{k, 0.7 * k, 5, 3, 0.5, 0.4};
@@ -110,7 +121,8 @@ TEST(ContactLaw, StaysWithinItsLimits) {
   }
 }
 
-// An open contact that held no spring has nothing to dissipate, exactly: or the ledger would depend on which pairs are near.
+// An open contact that held no spring has nothing to dissipate, exactly: or the ledger would depend on which
+// pairs are near.
 TEST(ContactLaw, OpenPairsDissipateNothing) {
   Random random(13);
   for (int round = 0; round < 1000; ++round) {
@@ -123,7 +135,8 @@ TEST(ContactLaw, OpenPairsDissipateNothing) {
 
 // Two grains held at a constant overlap, one pulled sideways at a constant speed.
 template <Features F>
-std::vector<double> pulled_sideways(const ContactParameters& law, double overlap, double step_length, int steps) {
+std::vector<double> pulled_sideways(const ContactParameters& law, double overlap, double step_length,
+                                    int steps) {
   const auto g = between_grains(Vec3d{0, 0, 2 * r - overlap}, 2 * r, 0.0);
   const double dt = 1e-5;
   const Motion<double> m{{step_length / dt, 0, 0}, {0, 0, 0}, {0, 0, 0}};
@@ -142,7 +155,8 @@ TEST(ContactLaw, SticksThenSlips) {
     EXPECT_NEAR(f[step], std::min(k * 1e-7 * (step + 1.0), 0.3 * f_n), 1e-12 * f_n);
 }
 
-// It holds up to mu_s, then carries mu_d for as long as it slides; once it has stood still it holds up to mu_s again.
+// It holds up to mu_s, then carries mu_d for as long as it slides; once it has stood still it holds up to
+// mu_s again.
 TEST(ContactLaw, SoftensWhenItSlips) {
   const double overlap = 1e-4, f_n = k * overlap;
   const ContactParameters law{k, k, 0, 0, 0.5, 0.3};
@@ -156,7 +170,9 @@ TEST(ContactLaw, SoftensWhenItSlips) {
   const double dt = 1e-5;
   const auto moving = [](double v) { return Motion<double>{{v, 0, 0}, {0, 0, 0}, {0, 0, 0}}; };
   Spring<double> s{{0, 0, 0}, 0};
-  const auto pull = [&](double v) { return -contact_law<softening>(law, dt, g, moving(v), moving(v), s).f.x; };
+  const auto pull = [&](double v) {
+    return -contact_law<softening>(law, dt, g, moving(v), moving(v), s).f.x;
+  };
   for (int step = 0; step < 1000; ++step) pull(0.01);
   EXPECT_EQ(s.slipping, 1);
   pull(0);
@@ -173,7 +189,8 @@ TEST(ContactLaw, ViscousWallWithoutSpring) {
     Spring<double> s{{0, 0, 0}, 0};
     const GrainRow grain{{0, 0, r - overlap}, r, {v, 0, 0}, r, {0, 0, 0}, 0};
     for (int step = 0; step < 100; ++step) {  // no memory: the same at every step
-      const auto a = wall_action<viscous>(wall, 1e-5, Drive{}, grain, {{v, 0, 0}, 0, {0, 0, 0}, 0}, WallName::floor, s);
+      const auto a =
+          wall_action<viscous>(wall, 1e-5, Drive{}, grain, {{v, 0, 0}, 0, {0, 0, 0}, 0}, WallName::floor, s);
       EXPECT_NEAR(a.f.x, -std::min(20 * v, 0.3 * f_n), 1e-12 * f_n);
       EXPECT_NEAR(a.f.z, f_n, 1e-12 * f_n);
     }

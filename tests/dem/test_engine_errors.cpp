@@ -8,14 +8,16 @@ namespace {
 
 class EngineErrors : public OnEveryBackend {
  protected:
-  void expect_error(const Scene& s, const State& state, std::initializer_list<const char*> words, std::int64_t steps = 0) {
+  void expect_error(const Scene& s, const State& state, std::initializer_list<const char*> words,
+                    std::int64_t steps = 0) {
     const auto engine = make();
     try {
       engine->load(s, state);
       engine->advance(steps);
       ADD_FAILURE() << "no error that names " << *words.begin();
     } catch (const Error& e) {
-      for (const char* word : words) EXPECT_NE(std::string(e.what()).find(word), std::string::npos) << e.what();
+      for (const char* word : words)
+        EXPECT_NE(std::string(e.what()).find(word), std::string::npos) << e.what();
     }
   }
 };
@@ -95,7 +97,8 @@ TEST(MakeEngine, SaysWhatIsMissing) {
     make_engine(Backend::cuda);
     FAIL();
   } catch (const Error& e) {
-    EXPECT_NE(std::string(e.what()).find(cuda_built() ? "no NVIDIA GPU" : "no CUDA"), std::string::npos) << e.what();
+    EXPECT_NE(std::string(e.what()).find(cuda_built() ? "no NVIDIA GPU" : "no CUDA"), std::string::npos)
+        << e.what();
   }
 }
 

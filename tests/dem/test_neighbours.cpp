@@ -63,12 +63,13 @@ TEST(Neighbours, AllPairs) {
       {{0.044, 0.066, 0.088}, true, true, true, 100, r, r},      // 2, 3 and 4 cells
       {{0.042, 0.042, 0.042}, true, true, true, 40, r, r},       // the smallest box allowed
       {{0.042, 0.3, 1}, true, true, false, 500, 0.5 * r, r},
-      {{1, 1, 1}, true, true, true, 30, r, r},                   // more cells than grains
+      {{1, 1, 1}, true, true, true, 30, r, r},  // more cells than grains
       {{0.1, 0.1, 0.1}, true, true, true, 1, r, r},
   };
   for (const Case& c : cases)
     for (const std::uint64_t seed : {1, 2}) {
-      SCOPED_TRACE(testing::Message() << "box " << c.box.x << " " << c.box.y << " " << c.box.z << ", seed " << seed);
+      SCOPED_TRACE(testing::Message()
+                   << "box " << c.box.x << " " << c.box.y << " " << c.box.z << ", seed " << seed);
       expect_all_pairs(c, seed);
     }
 }

@@ -31,7 +31,9 @@ State shuffled(const State& s) {
             [](const Contact& a, const Contact& b) { return std::pair(a.i, a.j) < std::pair(b.i, b.j); });
   for (WallContact& w : out.wall_contacts) w.i = place[w.i];
   std::sort(out.wall_contacts.begin(), out.wall_contacts.end(),
-            [](const WallContact& a, const WallContact& b) { return std::pair(a.wall, a.i) < std::pair(b.wall, b.i); });
+            [](const WallContact& a, const WallContact& b) {
+              return std::pair(a.wall, a.i) < std::pair(b.wall, b.i);
+            });
   return out;
 }
 

@@ -132,7 +132,8 @@ inline void expect_same_bits(const State& a, const State& b) {
   };
   same(a.id, b.id, "id"), same(a.r, b.r, "r"), same(a.role, b.role, "role");
   same(a.x, b.x, "x"), same(a.v, b.v, "v"), same(a.omega, b.omega, "omega");
-  same(a.rotation, b.rotation, "rotation"), same(a.force, b.force, "force"), same(a.torque, b.torque, "torque");
+  same(a.rotation, b.rotation, "rotation"), same(a.force, b.force, "force"),
+      same(a.torque, b.torque, "torque");
   same(a.x_start, b.x_start, "x_start");
   same(a.contacts, b.contacts, "contacts"), same(a.wall_contacts, b.wall_contacts, "wall_contacts");
   const auto numbers = [](const State& s) {

@@ -26,7 +26,8 @@ TEST_P(Cloud, ContactsAndForcesOfAllPairs) {
       double largest = 0;
       for (Index i = 0; i < now.size(); ++i)
         for (Index j = i + 1; j < now.size(); ++j)
-          if (length(nearest_image(sides, now.x[i] - now.x[j])) < now.r[i] + now.r[j]) pairs.push_back({i, j});
+          if (length(nearest_image(sides, now.x[i] - now.x[j])) < now.r[i] + now.r[j])
+            pairs.push_back({i, j});
       for (const Contact& c : now.contacts) found.push_back({c.i, c.j});
       EXPECT_EQ(found, pairs);
       if (k == 0) {  // springs are unstrained yet, velocities known at this very step
@@ -36,7 +37,8 @@ TEST_P(Cloud, ContactsAndForcesOfAllPairs) {
           const State& at = bed.state;
           const Motion<double> motion{at.v[i] - at.v[j], at.omega[i], at.omega[j]};
           Spring<double> spring{{0, 0, 0}, 0};
-          const auto a = contact_law<Features{true, true, false, true}>(s.grain, 0, g, motion, motion, spring);
+          const auto a =
+              contact_law<Features{true, true, false, true}>(s.grain, 0, g, motion, motion, spring);
           force[i] += a.f, force[j] -= a.f;
           largest = std::max(largest, length(a.f));
         }

@@ -58,8 +58,8 @@ TEST_P(EnergyLedger, Balances) {
 }
 ON_EVERY_BACKEND(EnergyLedger);
 
-// Second order, as the scheme is. Which contacts slip when differs from one dt to the next, so single slopes scatter; the
-// mean over four halvings is held to 0.2.
+// Second order, as the scheme is. Which contacts slip when differs from one dt to the next, so single slopes
+// scatter; the mean over four halvings is held to 0.2.
 TEST(EnergyLedgerOrder, Two) {
   const auto engine = make_engine(Backend::cpu, 1);
   for (const Variant& v : variants()) {

@@ -1,5 +1,5 @@
-// The same settled bed in LAMMPS (gran/hooke/history): the forces of its own configuration. Both sum the same overlaps, so
-// they may part by rounding only.
+// The same settled bed in LAMMPS (gran/hooke/history): the forces of its own configuration. Both sum the same
+// overlaps, so they may part by rounding only.
 #include <unistd.h>
 
 #include <cstdlib>
@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "backends.hpp"
+#include "dem/grain.hpp"
 #include "physics/scenes.hpp"
 
 namespace moraine::dem {
@@ -66,48 +67,81 @@ Bed lammps_scene(const fs::path& path) {
   return bed;
 }
 
-TEST(Lammps, SameForcesOnTheSameBed) {
-  const fs::path shared = MORAINE_SHARED_DIR, script = shared / "peers/lammps-bed";
-  const fs::path file = shared / "data/sphere-init-1e4.bin";
-  if (std::system("command -v lmp python3 > /dev/null") != 0) GTEST_SKIP() << "lmp or python3 is not installed";
-  if (!fs::exists(script) || !fs::exists(file)) GTEST_SKIP() << "no " << script << " or no " << file;
-
-  const fs::path dump = fs::path(testing::TempDir()) / ("lammps-bed-" + std::to_string(::getpid()) + ".txt");
-  const std::string command =
-      "python3 '" + script.string() + "' '" + file.string() + "' --steps 0 --dump '" + dump.string() + "' > /dev/null";
-  ASSERT_EQ(std::system(command.c_str()), 0);
-  const Bed bed = lammps_scene(file);
-  std::vector<Vec3d> theirs(bed.state.size());
-  std::ifstream in(dump);
+// Place and force of each grain, by id, after so many steps.
+struct Dump {
+  std::vector<Vec3d> x, force;
+};
+Dump lammps(const fs::path& script, const fs::path& bed, int steps, Index grains) {
+  const fs::path path = fs::path(testing::TempDir()) / ("lammps-bed-" + std::to_string(::getpid()) + ".txt");
+  const std::string command = "python3 '" + script.string() + "' '" + bed.string() + "' --steps " +
+                              std::to_string(steps) + " --dump '" + path.string() + "' > /dev/null";
+  EXPECT_EQ(std::system(command.c_str()), 0);
+  Dump dump{std::vector<Vec3d>(grains), std::vector<Vec3d>(grains)};
+  std::ifstream in(path);
   std::string line;
   for (int k = 0; k < 9; ++k) std::getline(in, line);  // heading
-  for (Index k = 0; k < bed.state.size(); ++k) {
-    int id;
-    double skip;
+  for (Index k = 0; k < grains; ++k) {
+    int id = 0;
     in >> id;
-    for (int q = 0; q < 9; ++q) in >> skip;
-    ASSERT_TRUE(in >> theirs.at(id - 1).x >> theirs[id - 1].y >> theirs[id - 1].z >> skip >> skip >> skip);
+    for (const char* what : {"x", "v", "omega", "force", "torque"}) {
+      Vec3d a{};
+      in >> a.x >> a.y >> a.z;
+      if (*what == 'x') dump.x.at(id - 1) = a;
+      if (*what == 'f') dump.force.at(id - 1) = a;
+    }
   }
-  in.close();
-  fs::remove(dump);
+  EXPECT_TRUE(in.good());
+  fs::remove(path);
+  return dump;
+}
 
-  for (const Backend backend : {Backend::cpu, Backend::reference}) {
-    const auto engine = make_engine(backend, 1);
-    engine->load(bed.scene, bed.state);
-    const State ours = engine->state();
-    double largest = 0, apart = 0;
+class Lammps : public OnEveryBackend {
+ protected:
+  void SetUp() override {
+    OnEveryBackend::SetUp();
+    if (IsSkipped()) return;
+    if (std::system("command -v lmp > /dev/null && command -v python3 > /dev/null") != 0)
+      GTEST_SKIP() << "lmp or python3 is not installed";
+    for (const fs::path& p : {script, file})
+      if (!fs::exists(p)) GTEST_SKIP() << "no " << p;
+  }
+  struct Gap {
+    double force, place;  // of the largest force; of the longest way gone
+  };
+  Gap gap(int steps) {
+    const Bed bed = lammps_scene(file);
+    const Dump theirs = lammps(script, file, steps, bed.state.size());
+    const State ours = run(*make(), bed.scene, bed.state, steps);
+    double force = 0, force_apart = 0, way = 0, apart = 0;
     for (Index i = 0; i < ours.size(); ++i) {
       if (ours.role[i] != Role::free) continue;
-      const Vec3d weight{0, 0, -mass(bed.scene, ours.r[i]) * bed.scene.gravity};  // theirs has it in the force
-      largest = std::max(largest, length(theirs[ours.id[i]]));
-      apart = std::max(apart, length(ours.force[i] + weight - theirs[ours.id[i]]));
-      largest = std::max(largest, length(ours.force[i]));
+      const Index id = ours.id[i];
+      const Vec3d weight{0, 0, -mass(bed.scene, ours.r[i]) * bed.scene.gravity};  // theirs is in the force
+      force = std::max(force, length(ours.force[i]));
+      force_apart = std::max(force_apart, length(ours.force[i] + weight - theirs.force[id]));
+      way = std::max(way, length(ours.x[i] - ours.x_start[i]));
+      apart = std::max(apart, length(nearest_image(Sides::of(bed.scene), ours.x[i] - theirs.x[id])));
     }
-    RecordProperty("apart", std::to_string(apart / largest));
-    EXPECT_LT(apart, 1e-9 * largest);
-    std::printf("lammps %g\n", apart / largest);
+    return {force_apart / force, steps > 0 ? apart / way : 0};
   }
+  const fs::path script = fs::path(MORAINE_SHARED_DIR) / "peers/lammps-bed";
+  const fs::path file = fs::path(MORAINE_SHARED_DIR) / "data/sphere-init-1e4.bin";
+};
+
+TEST_P(Lammps, SameForcesAtTheStart) { EXPECT_LT(gap(0).force, 1e-9); }
+
+// Step by step the two schemes differ: LAMMPS takes the lever arm as r, not r + delta_n/2 (1e-5 less on
+// average, 2e-4 at the most in this bed), and turns its springs to first order. After one step that is seen
+// in new springs only (1e-8 of the force); after ten the places still agree to 1e-6 of the way gone.
+TEST_P(Lammps, SameCourseToTheirLeverArm) {
+  const Gap one = gap(1), ten = gap(10);
+  EXPECT_LT(one.place, 1e-7);  // 1e-16 m of 5e-9 m
+  EXPECT_LT(one.force, 1e-8);
+  EXPECT_LT(ten.place, 1e-6);
+  EXPECT_LT(ten.force, 1e-4);
 }
+
+ON_EVERY_BACKEND(Lammps);
 
 }  // namespace
 }  // namespace moraine::dem

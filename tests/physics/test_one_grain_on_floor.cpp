@@ -1,5 +1,6 @@
-// One grain on a plane, known answers. Contact is at the lever arm l = R - overlap/2, which the textbook's rigid sphere
-// knows as R; where l is constant the answers are compared with l in place, and with the textbook to overlap/R.
+// One grain on a plane, known answers. Contact is at the lever arm l = R - overlap/2, which the textbook's
+// rigid sphere knows as R; where l is constant the answers are compared with l in place, and with the
+// textbook to overlap/R.
 #include "backends.hpp"
 #include "dem/engine_parts.hpp"
 #include "physics/scenes.hpp"
@@ -83,13 +84,14 @@ TEST_P(OneGrain, SlidesThenRolls) {
   EXPECT_NEAR(length(cross(now.omega[0], Vec3d{-along.y, along.x, 0})), 0, 1e-12 * omega);  // no other spin
 }
 
-// Impulses are in Coulomb's ratio in every step that slips, so e_t follows from e to rounding. The spin's lever arm is
-// R - xi/2 with xi = (v_n/w) sin(wt): its mean, weighted with the force, is R - (pi/8) v_n/w.
+// Impulses are in Coulomb's ratio in every step that slips, so e_t follows from e to rounding. The spin's
+// lever arm is R - xi/2 with xi = (v_n/w) sin(wt): its mean, weighted with the force, is R - (pi/8) v_n/w.
 TEST_P(OneGrain, ObliqueImpactSlidesThroughout) {
   const auto engine = make();
   for (const double gamma : {0.0, 10.0}) {
     Scene s = on_floor(1e5, 0.2);
-    s.wall.gamma_n = s.wall.gamma_t = gamma;  // gamma_t: it slides at once, where a spring alone must load first
+    s.wall.gamma_n = s.wall.gamma_t =
+        gamma;  // gamma_t: it slides at once, where a spring alone must load first
     const double w = std::sqrt(s.wall.k_n / mass(s, R)), v_n = 0.1, tan_theta = 3, v_t = v_n * tan_theta;
     s.dt = 1e-3 / w;
     const Vec3d along{0.6, -0.8, 0}, axis{0.8, 0.6, 0};
@@ -100,7 +102,8 @@ TEST_P(OneGrain, ObliqueImpactSlidesThroughout) {
 
     const double e = now.v[0].z / v_n, mu = s.wall.mu_d;
     const double beta = 0.5 * gamma / mass(s, R), damped = std::sqrt(w * w - beta * beta);
-    EXPECT_NEAR(e, std::exp(-beta / damped * std::atan2(2 * beta * damped, beta * beta - damped * damped)), 1e-6);
+    EXPECT_NEAR(e, std::exp(-beta / damped * std::atan2(2 * beta * damped, beta * beta - damped * damped)),
+                1e-6);
     EXPECT_NEAR(dot(now.v[0], along) / v_t, 1 - mu * (1 + e) / tan_theta, 1e-12);
     const double spin = 2.5 * mu * (1 + e) * v_n / R, deepest = v_n / w;
     EXPECT_NEAR(dot(now.omega[0], axis) / spin, 1, deepest / R);
@@ -113,8 +116,8 @@ TEST_P(OneGrain, ObliqueImpactSlidesThroughout) {
 
 ON_EVERY_BACKEND(OneGrain);
 
-// A scene has vertical gravity only, so the plane stays level here and gravity leans: the grain's step is taken with the
-// program's own wall contact and leapfrog, with the downhill part of gravity added.
+// A scene has vertical gravity only, so the plane stays level here and gravity leans: the grain's step is
+// taken with the program's own wall contact and leapfrog, with the downhill part of gravity added.
 struct Incline {
   double acceleration, spin_acceleration;  // m/s2, rad/s2
 };

@@ -14,7 +14,8 @@ TEST_P(OrderOfAccuracy, ObliqueContact) {
     Scene s = empty_space(1e5);
     s.grain = {1e5, 6e4, gamma, 0.5 * gamma, 100, 100};
     const double r1 = 0.01, r2 = 0.013, w = std::sqrt(s.grain.k_n * (1 / mass(s, r1) + 1 / mass(s, r2)));
-    State start = grains_at_rest({r1, r2}, {Vec3d{0, 0, 0}, 0.97 * (r1 + r2) * Vec3d{1.0 / 3, 2.0 / 3, 2.0 / 3}});
+    State start =
+        grains_at_rest({r1, r2}, {Vec3d{0, 0, 0}, 0.97 * (r1 + r2) * Vec3d{1.0 / 3, 2.0 / 3, 2.0 / 3}});
     const double v = 0.02 * r1 * w;
     start.v[0] = v * Vec3d{1.0, -0.3, 0.9}, start.v[1] = v * Vec3d{0.2, -0.7, 0.1};
     start.omega[0] = v / r1 * Vec3d{1, 2, -3}, start.omega[1] = v / r1 * Vec3d{0.5, -2, 1.5};

@@ -1,5 +1,6 @@
-// The wall that keeps a stress, on elastic columns. Each is a chain of n grains (mass m) on the floor with half a grain's
-// mass of wall on top, all springs k: its modes are u_j = sin(q j), q = (p - 1/2) pi/(n + 1), w = 2 sqrt(k/m) sin(q/2).
+// The wall that keeps a stress, on elastic columns. Each is a chain of n grains (mass m) on the floor with
+// half a grain's mass of wall on top, all springs k: its modes are u_j = sin(q j), q = (p - 1/2) pi/(n + 1),
+// w = 2 sqrt(k/m) sin(q/2).
 #include "backends.hpp"
 #include "physics/scenes.hpp"
 
@@ -16,7 +17,8 @@ TEST_P(ServoWall, SwingsAtItsFrequencyAroundItsStress) {
   s.box = {3 * d, 3 * d, 1};
   s.gravity = 0;
   s.grain = s.wall = {k, k, 0, 0, 0.3, 0.3};
-  const double m = mass(s, r), q = 0.5 * std::numbers::pi / (n + 1), w = 2 * std::sqrt(k / m) * std::sin(0.5 * q);
+  const double m = mass(s, r), q = 0.5 * std::numbers::pi / (n + 1),
+               w = 2 * std::sqrt(k / m) * std::sin(0.5 * q);
   s.top_wall = {TopWall::Drive::stress, columns * 0.5 * m, 5000, 0, 0, 0, 0};
   const int per_period = 1000, periods = 5;
   s.dt = 2 * std::numbers::pi / (w * per_period);
@@ -44,7 +46,8 @@ TEST_P(ServoWall, SwingsAtItsFrequencyAroundItsStress) {
     }
     z_before = now.wall_z;
   }
-  // From the turning point to the last crossing: periods - 3/4. Leapfrog and interpolation: (w dt)^2/24 = 1.6e-6.
+  // From the turning point to the last crossing: periods - 3/4. Leapfrog and interpolation: (w dt)^2/24
+  // = 1.6e-6.
   ASSERT_EQ(crossings, periods);
   EXPECT_NEAR((periods - 0.75) * 2 * std::numbers::pi / (w * crossing), 1, 2e-6);
   // The wall ends where it began, so all momentum it took was the load's.

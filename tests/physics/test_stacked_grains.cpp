@@ -1,5 +1,5 @@
-// Two grains one on the other, pressed between the floor and a fixed wall: two coupled oscillators, whose differential
-// equations CVODE solves at 1e-12 as the reference.
+// Two grains one on the other, pressed between the floor and a fixed wall: two coupled oscillators, whose
+// differential equations CVODE solves at 1e-12 as the reference.
 #include <cvode/cvode.h>
 #include <nvector/nvector_serial.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
@@ -62,12 +62,13 @@ TEST_P(StackedGrains, MoveAsCoupledOscillators) {
     s.grain.gamma_n = gamma, s.wall.gamma_n = 0.5 * gamma;
     s.top_wall.drive = TopWall::Drive::velocity;
     const double m1 = mass(s, r1), m2 = mass(s, r2), w = std::sqrt(s.grain.k_n / m2), squeeze = 3e-4;
-    State start = grains_at_rest({r1, r2}, {Vec3d{0, 0, r1 - squeeze}, Vec3d{0, 0, 2 * r1 + r2 - 2 * squeeze}});
+    State start =
+        grains_at_rest({r1, r2}, {Vec3d{0, 0, r1 - squeeze}, Vec3d{0, 0, 2 * r1 + r2 - 2 * squeeze}});
     start.wall_z = 2 * (r1 + r2) - 3 * squeeze;
     start.v[0].z = 0.1, start.v[1].z = -0.2;
     const double end = 40 / w;
-    const std::vector<double> exact =
-        reference({m1, m2, s.gravity, start.wall_z, s.grain, s.wall}, {start.x[0].z, start.x[1].z, 0.1, -0.2}, end);
+    const std::vector<double> exact = reference({m1, m2, s.gravity, start.wall_z, s.grain, s.wall},
+                                                {start.x[0].z, start.x[1].z, 0.1, -0.2}, end);
 
     std::vector<double> z[2];
     for (const int steps : {20000, 40000}) {
@@ -80,8 +81,10 @@ TEST_P(StackedGrains, MoveAsCoupledOscillators) {
         z[i].push_back(now.x[i].z);
       }
     }
-    for (const int i : {0, 1})  // the second-order part taken away, what is left is of fourth order (third, if damped)
-      EXPECT_NEAR((4 * z[i][1] - z[i][0]) / 3, exact[i], (gamma > 0 ? 1e-8 : 1e-10) * squeeze) << "grain " << i;
+    for (const int i :
+         {0, 1})  // the second-order part taken away, what is left is of fourth order (third, if damped)
+      EXPECT_NEAR((4 * z[i][1] - z[i][0]) / 3, exact[i], (gamma > 0 ? 1e-8 : 1e-10) * squeeze)
+          << "grain " << i;
   }
 }
 

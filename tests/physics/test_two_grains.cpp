@@ -12,7 +12,8 @@ struct Collision {
   double time, overlap, v1, v2;  // s, m, m/s along the line of flight
 };
 
-// Grain 1 flies at v0 at grain 2, which rests. They begin half a step apart, so that contact begins between two steps.
+// Grain 1 flies at v0 at grain 2, which rests. They begin half a step apart, so that contact begins between
+// two steps.
 Collision collide(Engine& engine, const Scene& s, double r2) {
   const Vec3d n{1.0 / 3, 2.0 / 3, 2.0 / 3};
   const double gap = 0.5 * v0 * s.dt;
@@ -54,12 +55,14 @@ TEST_P(TwoGrains, HeadOnElastic) {
   }
 }
 
-// m* xi'' + gamma xi' + k xi = 0 from xi = 0, xi' = v0, until the force k xi + gamma xi' is zero and would begin to pull
-// (Schwager and Poeschel 2007). With beta = gamma/2m*, w^2 = w0^2 - beta^2 that is at t_c = atan2(2 beta w, beta^2 - w^2)/w,
-// or ln((beta + W)/(beta - W))/W with W^2 = beta^2 - w0^2 where it is overdamped; then xi' = -v0 exp(-beta t_c).
+// m* xi'' + gamma xi' + k xi = 0 from xi = 0, xi' = v0, until the force k xi + gamma xi' is zero and would
+// begin to pull (Schwager and Poeschel 2007). With beta = gamma/2m*, w^2 = w0^2 - beta^2 that is at t_c =
+// atan2(2 beta w, beta^2 - w^2)/w, or ln((beta + W)/(beta - W))/W with W^2 = beta^2 - w0^2 where it is
+// overdamped; then xi' = -v0 exp(-beta t_c).
 double restitution(double beta, double w0) {
   const double w = std::sqrt(std::abs(w0 * w0 - beta * beta));
-  const double t_c = beta < w0 ? std::atan2(2 * beta * w, beta * beta - w * w) / w : std::log((beta + w) / (beta - w)) / w;
+  const double t_c =
+      beta < w0 ? std::atan2(2 * beta * w, beta * beta - w * w) / w : std::log((beta + w) / (beta - w)) / w;
   return std::exp(-beta * t_c);
 }
 
@@ -74,16 +77,17 @@ TEST_P(TwoGrains, HeadOnDamped) {
       const Collision c = collide(*engine, s, r2);
       // second order: the largest rate is w0 or 2 beta
       const double rate = std::max(1.0, 2 * damping) * 1e-3;
-      EXPECT_NEAR((c.v2 - c.v1) / v0, restitution(damping * w0, w0), rate * rate) << "beta/omega_0 = " << damping;
+      EXPECT_NEAR((c.v2 - c.v1) / v0, restitution(damping * w0, w0), rate * rate)
+          << "beta/omega_0 = " << damping;
     }
 }
 
 ON_EVERY_BACKEND(TwoGrains);
 
-// A pair with a strained tangential spring, carried round once as one rigid body, about four axes in the four lanes of a
-// Pack: two across the normal, along it, oblique. Force and torque must turn with it. The step is small because the
-// velocity at the contact is itself of second order in the angle: a pair that turns by one radian in steps of theta
-// gathers theta^2/6 of its size.
+// A pair with a strained tangential spring, carried round once as one rigid body, about four axes in the four
+// lanes of a Pack: two across the normal, along it, oblique. Force and torque must turn with it. The step is
+// small because the velocity at the contact is itself of second order in the angle: a pair that turns by one
+// radian in steps of theta gathers theta^2/6 of its size.
 TEST(RotatedPair, ForcesTurnWithIt) {
   using Vec3p = Vec3<Pack>;
   const double r_i = 0.012, r_j = 0.008, distance = 0.98 * (r_i + r_j), strained = 0.01 * distance;
@@ -91,10 +95,12 @@ TEST(RotatedPair, ForcesTurnWithIt) {
   const double theta = 5e-7, dt = 1e-6;
   const auto steps = static_cast<std::int64_t>(2 * std::numbers::pi / theta);
 
-  const Vec3d n{1.0 / 3, 2.0 / 3, 2.0 / 3}, t{2.0 / 3, 1.0 / 3, -2.0 / 3}, b = cross(n, t), o = n + 2.0 * t + b;
+  const Vec3d n{1.0 / 3, 2.0 / 3, 2.0 / 3}, t{2.0 / 3, 1.0 / 3, -2.0 / 3}, b = cross(n, t),
+                                                                           o = n + 2.0 * t + b;
   const Vec3d axes[4] = {t, b, n, 1 / length(o) * o};
   const auto lanes = [](auto&& a) {  // a(lane) is a vector
-    return Vec3p{{a(0).x, a(1).x, a(2).x, a(3).x}, {a(0).y, a(1).y, a(2).y, a(3).y}, {a(0).z, a(1).z, a(2).z, a(3).z}};
+    return Vec3p{
+        {a(0).x, a(1).x, a(2).x, a(3).x}, {a(0).y, a(1).y, a(2).y, a(3).y}, {a(0).z, a(1).z, a(2).z, a(3).z}};
   };
   const auto lane = [](const Vec3p& a, int l) { return Vec3d{a.x[l], a.y[l], a.z[l]}; };
   const Vec3p axis = lanes([&](int l) { return axes[l]; }), n_0 = lanes([&](int) { return n; });
@@ -112,7 +118,8 @@ TEST(RotatedPair, ForcesTurnWithIt) {
       const double angle = static_cast<double>(step) * theta;
       const auto g = between_grains<Pack>(Pack(distance) * turned(angle), r_i + r_j, r_i - r_j);
       // (x(n) - x(n-1))/dt, without the cancellation
-      const Vec3p v = Pack(2 * std::sin(0.5 * theta) / dt * distance) * cross(axis, turned(angle - 0.5 * theta));
+      const Vec3p v =
+          Pack(2 * std::sin(0.5 * theta) / dt * distance) * cross(axis, turned(angle - 0.5 * theta));
       const Motion<Pack> motion{v, omega, omega};
       a = contact_law<Features{true, false, false, true}, Pack>(law, dt, g, motion, motion, s);
       slip += a.slip;
@@ -120,7 +127,8 @@ TEST(RotatedPair, ForcesTurnWithIt) {
     const double end = static_cast<double>(steps) * theta, scale = k * strained;
     for (int l = 0; l < 4; ++l) {
       const auto expected = [&](const Vec3d& c) {  // Rodrigues
-        return std::cos(end) * c + std::sin(end) * cross(axes[l], c) + (1 - std::cos(end)) * dot(axes[l], c) * axes[l];
+        return std::cos(end) * c + std::sin(end) * cross(axes[l], c) +
+               (1 - std::cos(end)) * dot(axes[l], c) * axes[l];
       };
       const Vec3d n_end = expected(n), f = lane(a.f, l), f_t = f - dot(f, n_end) * n_end;
       EXPECT_EQ(slip[l], 0);
@@ -128,7 +136,8 @@ TEST(RotatedPair, ForcesTurnWithIt) {
       EXPECT_LT(length(f_t - expected(-k * first)), 1e-10 * scale) << "axis " << l;
       EXPECT_LT(length(lane(a.n_x_f, l) - expected(cross(n, -k * first))), 1e-10 * scale) << "axis " << l;
       // What the forces do to the pair, the torques undo.
-      EXPECT_LT(length(cross(distance * n_end, f) - distance * lane(a.n_x_f, l)), 1e-14 * distance * length(f));
+      EXPECT_LT(length(cross(distance * n_end, f) - distance * lane(a.n_x_f, l)),
+                1e-14 * distance * length(f));
     }
   }
 }

@@ -1,0 +1,189 @@
+// What a person is told when a case cannot be run: file, key, value, what was expected.
+#include <sched.h>
+#include <sys/mount.h>
+
+#include "program.hpp"
+
+namespace moraine {
+namespace {
+
+class Errors : public Program {
+ protected:
+  // Fails with one line on standard error that holds all these words.
+  void expect_error(const std::vector<std::string>& command, const std::vector<std::string>& words) const {
+    const Outcome o = moraine(command);
+    EXPECT_EQ(o.status, 1) << o.err;
+    EXPECT_EQ(o.out, "");
+    EXPECT_EQ(std::count(o.err.begin(), o.err.end(), '\n'), 1) << o.err;
+    EXPECT_TRUE(o.err.starts_with("moraine: ")) << o.err;
+    for (const std::string& word : words)
+      EXPECT_NE(o.err.find(word), std::string::npos) << "no \"" << word << "\" in: " << o.err;
+  }
+  void expect_error_in(const std::string& old, const std::string& now,
+                       const std::vector<std::string>& words) const {
+    std::string text = small_case();
+    text.replace(text.find(old), old.size(), now);
+    const fs::path bad = make("bad", text);
+    expect_error(to_run(bad), words);
+    EXPECT_FALSE(fs::exists(bad / "output"));
+  }
+};
+
+TEST_F(Errors, UnknownKey) {
+  expect_error_in(
+      "columns_y", "colums_y",
+      {"bad/case.toml:5", "grains.colums_y = 6", "unknown key", "did you mean grains.columns_y?"});
+  expect_error_in("mu_s", "mu", {"bad/case.toml:10", "contact.mu = 0.5", "unknown key"});
+}
+
+TEST_F(Errors, WrongType) {
+  expect_error_in("seed = 3", "seed = \"three\"",
+                  {"bad/case.toml:6", "grains.seed", "\"three\"", "expected an integer"});
+  expect_error_in("mu_s = 0.5", "mu_s = true",
+                  {"bad/case.toml:10", "contact.mu_s = true", "expected a number"});
+}
+
+TEST_F(Errors, WrongDimension) {
+  expect_error_in("\"2 kPa\"", "\"2 km\"",
+                  {"bad/case.toml:", "stage.consolidate.normal_stress", "2 km", "Pa"});
+}
+
+TEST_F(Errors, WrongChoice) {
+  expect_error_in(
+      "\"shear\"\nkind = \"shear\"", "\"shear\"\nkind = \"sheer\"",
+      {"bad/case.toml:", "stage.shear.kind", "sheer", "settle | consolidate | shear", "did you mean shear?"});
+}
+
+TEST_F(Errors, NegativeRadius) {
+  expect_error_in("seed = 3", "radius_mean = -0.02",
+                  {"bad/case.toml:6", "grains.radius_mean = -0.02", "expected > 0 m"});
+}
+
+TEST_F(Errors, NoToml) { expect_error_in("[grains]", "[grains", {"bad/case.toml:2"}); }
+
+TEST_F(Errors, NoCase) {
+  expect_error(to_run(directory.path() / "nowhere"), {"nowhere/case.toml: not found", "case.toml"});
+}
+
+TEST_F(Errors, SetOnTheCommandLine) {
+  const fs::path small = make("small", small_case());
+  expect_error(to_run(small, {"contact.kn=5"}),
+               {"--set contact.kn=5", "unknown key", "did you mean contact.k_n?"});
+  expect_error(to_run(small, {"stage.sheer.strain=1"}),
+               {"--set stage.sheer.strain=1", "no stage", "settle, consolidate, shear"});
+  expect_error(to_run(small, {"model.f"}), {"--set model.f", "KEY=VALUE"});
+}
+
+TEST_F(Errors, GrainsOverlapAtTheStart) {
+  expect_error_in("seed = 3", "cell = 0.9", {"bad/case.toml:6", "grains.cell = 0.9", "expected >= 1.05"});
+  const fs::path small = make("small", small_case());
+  expect_error(to_run(small, {"box.x=0.1"}), {"overlap at the start", "grains.columns_x", "grains.cell"});
+}
+
+// Two grains in one place, as a damaged or foreign start file may hold them.
+TEST_F(Errors, GrainsOfTheStartInOnePlace) {
+  const fs::path bed = make("bed", "stages = [\"settle\"]\n" + small_case());
+  run(bed, {"stage.settle.duration=0.01"});
+  output::Checkpoint c = output::read_checkpoint(checkpoint_of(bed));
+  c.state.x[7] = c.state.x[8];
+  const fs::path next = make("next", "start = \"start.h5\"\n" + small_case());
+  output::write_checkpoint(next / "start.h5", c);
+  expect_error(to_run(next), {"grain"});
+}
+
+TEST_F(Errors, StartFiles) {
+  const fs::path small = make("small", small_case());
+  const auto words = [&](const std::string& start) { return to_run(small, {"start=" + start}); };
+  expect_error(words("../nowhere"), {"start=../nowhere", "there is no", "a finished case or a checkpoint"});
+  make("not-run", small_case());
+  expect_error(words("../not-run"), {"start=../not-run", "run that case first"});
+  directory.write("text.h5", "no HDF5 file");
+  expect_error(words("../text.h5"), {"text.h5", "not an HDF5 file"});
+
+  const fs::path bed = make("bed", "stages = [\"settle\"]\n" + small_case());
+  run(bed, {"stage.settle.duration=0.01"});
+  const std::string whole = contents(checkpoint_of(bed));
+  for (const std::size_t size : {whole.size() / 2, whole.size() - 1}) {
+    directory.write("cut.h5", whole.substr(0, size));
+    expect_error(words("../cut.h5"), {"cut.h5", "truncated"});
+  }
+  expect_error(words("../bed/output/series.h5"), {"series.h5", "not a checkpoint of moraine"});
+  EXPECT_FALSE(fs::exists(small / "output"));
+}
+
+TEST_F(Errors, ImportOfWhatIsNoBed) {
+  const auto import = [&](const fs::path& file) {
+    return std::vector<std::string>{"import-sphere", file.string(), (directory.path() / "imported").string()};
+  };
+  expect_error(import(directory.path() / "nowhere.bin"), {"nowhere.bin", "cannot be read", "sphere"});
+  expect_error(import(directory.write("short.bin", std::string(20, '\0'))), {"short.bin"});
+  const fs::path bed = fs::path(MORAINE_SHARED_DIR) / "data/sphere-init-1e4.bin";
+  if (fs::exists(bed)) {
+    expect_error(import(directory.write("cut.bin", contents(bed).substr(0, 100'000))),
+                 {"cut.bin", "truncated", "bytes expected"});
+  }
+  EXPECT_FALSE(fs::exists(directory.path() / "imported"));
+}
+
+// Root may write everywhere, so a file stands where the directory should be.
+TEST_F(Errors, OutputNotWritable) {
+  const fs::path small = make("small", small_case());
+  directory.write("small/output", "");
+  expect_error(to_run(small), {"small/output", "cannot be created"});
+  auto words = to_run(small);
+  words.push_back("--force");
+  expect_error(words, {"small/output", "cannot be created"});
+}
+
+TEST_F(Errors, BlowUpNamesGrainAndStep) {
+  const fs::path small = make("small", small_case());
+  expect_error(to_run(small, {"model.f=30"}),
+               {"grain ", " at step ", "position (", "smaller model.f", "the last good checkpoint stays in",
+                "small/output/checkpoint.h5"});
+  const output::Checkpoint kept = output::read_checkpoint(checkpoint_of(small));
+  EXPECT_EQ(kept.stage, 0);
+  EXPECT_FALSE(kept.finished);
+  for (const dem::Vec3d& x : kept.state.x) EXPECT_GT(x.z, 0);
+  EXPECT_NE(contents(small / "output/log.txt").find("stopped: grain "), std::string::npos);
+  EXPECT_FALSE(output::read_series(series_of(small)).empty());
+}
+
+// Not at the start but on the way: what was good before stays, and is good to go on from.
+TEST_F(Errors, BlowUpInALaterStage) {
+  const fs::path small = make("small", small_case());
+  const Outcome o = moraine(to_run(small, {"stage.shear.f=30"}));
+  EXPECT_EQ(o.status, 1);
+  for (const char* word : {"grain ", " at step ", "checkpoint.h5"})
+    EXPECT_NE(o.err.find(word), std::string::npos) << o.err;
+  const output::Checkpoint kept = output::read_checkpoint(checkpoint_of(small));
+  EXPECT_GE(kept.stage, 1);  // its end, or the start of the next
+  for (const dem::Vec3d& x : kept.state.x) EXPECT_GT(x.z, -0.01);
+  EXPECT_GE(kept.rows.size(), 60u);
+}
+
+TEST_F(Errors, DiskFull) {
+  const fs::path whole = make("whole", small_case()), small = make("small", small_case());
+  run(whole);
+  fs::create_directory(small / "output");
+  const std::string disk = (small / "output").string();
+  // A file system of this process only, so that nothing stays mounted.
+  if (::unshare(CLONE_NEWNS) != 0 || ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
+      ::mount("tmpfs", disk.c_str(), "tmpfs", 0, "size=300k") != 0) {
+    GTEST_SKIP() << "no permission to mount a small file system";
+  }
+  const Outcome o = moraine(to_run(small));
+  EXPECT_EQ(o.status, 1);
+  for (const char* word : {"small/output/", "No space left on device", "the last good checkpoint stays in"})
+    EXPECT_NE(o.err.find(word), std::string::npos) << o.err;
+  const output::Checkpoint kept = output::read_checkpoint(checkpoint_of(small));
+  EXPECT_FALSE(kept.finished);
+
+  // With room made, it goes on.
+  ASSERT_EQ(::mount("tmpfs", disk.c_str(), "tmpfs", MS_REMOUNT, "size=20m"), 0);
+  run(small, {}, {"--resume"});
+  expect_same_results(whole, small);
+  ::umount(disk.c_str());
+}
+
+}  // namespace
+}  // namespace moraine

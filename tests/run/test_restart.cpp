@@ -1,0 +1,148 @@
+// A run that is cut off anywhere and resumed ends with the bits of the run that was not.
+#include <chrono>
+#include <random>
+#include <thread>
+
+#include "program.hpp"
+
+namespace moraine {
+namespace {
+
+using namespace std::chrono_literals;
+using Seconds = std::chrono::duration<double>;
+using Clock = std::chrono::steady_clock;
+
+class Restart : public Program {
+ protected:
+  void SetUp() override {
+    const auto began = Clock::now();
+    whole = make("whole", small_case());
+    ASSERT_NO_FATAL_FAILURE(run(whole));
+    length = Clock::now() - began;
+    cut = make("cut", small_case());
+  }
+
+  // Starts or resumes, and sends the signal after so long. False if the run was over before.
+  bool run_for(Seconds time, int signal) {
+    auto words = to_run(cut);
+    if (fs::exists(cut / "output")) words.push_back("--resume");
+    const auto process = start(words);
+    std::this_thread::sleep_for(time);
+    const bool hit = process->running();
+    process->send(signal);
+    const int status = process->wait();
+    if (hit && signal == SIGKILL) {
+      EXPECT_TRUE(status == -SIGKILL || status == 0) << status;
+    }
+    if (!hit) {
+      EXPECT_EQ(status, 0) << contents(directory.path() / "err");
+    }
+    return hit;
+  }
+
+  void finish_and_compare() {
+    ASSERT_NO_FATAL_FAILURE(run(cut, {}, {"--resume"}));
+    expect_same_results(whole, cut);
+    for (const auto& entry : fs::recursive_directory_iterator(cut / "output"))
+      EXPECT_NE(entry.path().extension(), ".tmp") << entry.path();
+  }
+
+  fs::path whole, cut;
+  Seconds length{};
+};
+
+// Each kill hits a run that has resumed from where the one before had got to.
+TEST_F(Restart, TenKillsAtRandomMoments) {
+  std::mt19937 random(2013);
+  std::uniform_real_distribution<double> share(0.02, 0.25);
+  int hits = 0;
+  for (int k = 0; k < 10; ++k) hits += run_for(share(random) * length, SIGKILL);
+  EXPECT_GE(hits, 3);
+  finish_and_compare();
+}
+
+// One kill in each of ten runs, anywhere from start to end.
+TEST_F(Restart, OneKillAnywhere) {
+  std::mt19937 random(23);
+  std::uniform_real_distribution<double> share(0, 1);
+  for (int k = 0; k < 10; ++k) {
+    fs::remove_all(cut / "output");
+    const Seconds time = share(random) * length;
+    run_for(time, SIGKILL);
+    SCOPED_TRACE("killed after " + std::to_string(time.count()) + " of " + std::to_string(length.count()) +
+                 " s");
+    finish_and_compare();
+  }
+}
+
+// Before the first checkpoint, and while the first files are made.
+TEST_F(Restart, KillsInTheFirstMilliseconds) {
+  for (int ms = 0; ms < 16; ms += 2) {
+    fs::remove_all(cut / "output");
+    run_for(ms * 1ms, SIGKILL);
+    SCOPED_TRACE("killed after " + std::to_string(ms) + " ms");
+    finish_and_compare();
+  }
+}
+
+// Control-C and an order to end are no accidents: a checkpoint is written.
+TEST_F(Restart, InterruptedInOrder) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    fs::remove_all(cut / "output");
+    if (run_for(0.3 * length, signal)) {
+      const std::string message = contents(directory.path() / "err");
+      EXPECT_NE(message.find("interrupted at step"), std::string::npos) << message;
+      EXPECT_NE(message.find("--resume"), std::string::npos) << message;
+    }
+    finish_and_compare();
+  }
+}
+
+TEST_F(Restart, OnAnotherNumberOfThreads) {
+  run_for(0.5 * length, SIGKILL);
+  ASSERT_NO_FATAL_FAILURE(run(cut, {}, {"--resume", "--threads", "2"}));
+  expect_same_results(whole, cut);
+}
+
+TEST_F(Restart, AFinishedCaseIsLeftAlone) {
+  const std::string before = contents(checkpoint_of(whole));
+  const Outcome again = moraine(to_run(whole));
+  EXPECT_EQ(again.status, 1);
+  for (const char* word : {"whole/output", "--resume", "--force"})
+    EXPECT_NE(again.err.find(word), std::string::npos) << again.err;
+
+  auto words = to_run(whole);
+  words.push_back("--resume");
+  const Outcome resumed = moraine(words);
+  EXPECT_EQ(resumed.status, 0) << resumed.err;
+  EXPECT_NE(resumed.err.find("finished already"), std::string::npos) << resumed.err;
+  EXPECT_NE(resumed.out.find("friction"), std::string::npos) << resumed.out;
+  EXPECT_TRUE(contents(checkpoint_of(whole)) == before);
+
+  ASSERT_NO_FATAL_FAILURE(run(cut));
+  ASSERT_NO_FATAL_FAILURE(run(whole, {}, {"--force"}));
+  expect_same_results(whole, cut);
+}
+
+TEST_F(Restart, RefusesAChangedCase) {
+  run_for(0.5 * length, SIGKILL);
+  auto words = to_run(cut, {"stage.shear.normal_stress=3 kPa"});
+  words.push_back("--resume");
+  const Outcome o = moraine(words);
+  EXPECT_EQ(o.status, 1);
+  for (const char* word : {"checkpoint.h5", "another version of this case", "--force"})
+    EXPECT_NE(o.err.find(word), std::string::npos) << o.err;
+  finish_and_compare();
+}
+
+TEST_F(Restart, RefusesToStartFromAnUnfinishedCase) {
+  if (!run_for(0.3 * length, SIGTERM)) GTEST_SKIP() << "the run was over too soon";
+  const fs::path next = make("next", "start = \"../cut\"\nstages = [\"shear\"]\n" + small_case());
+  const Outcome o = moraine(to_run(next));
+  EXPECT_EQ(o.status, 1);
+  for (const char* word : {"cut/output/checkpoint.h5", "not finished"})
+    EXPECT_NE(o.err.find(word), std::string::npos) << o.err;
+}
+
+}  // namespace
+}  // namespace moraine
