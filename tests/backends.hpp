@@ -1,5 +1,5 @@
-// Test bodies are written once and run on every backend: `class Bounce : public OnEveryBackend {}; TEST_P(Bounce, ...)
-// { auto engine = make(); ... }  ON_EVERY_BACKEND(Bounce);`
+// Test bodies are written once and run on every backend: `class Bounce : public OnEveryBackend {};
+// TEST_P(Bounce, ...) { auto engine = make(); ... }  ON_EVERY_BACKEND(Bounce);`
 #pragma once
 #include <gtest/gtest.h>
 
@@ -25,14 +25,17 @@ class OnEveryBackend : public testing::TestWithParam<BackendChoice> {
     if (!dem::cuda_built()) GTEST_SKIP() << "this build has no CUDA in it";
     if (!dem::cuda_device_present()) GTEST_SKIP() << "no NVIDIA GPU here";
   }
-  std::unique_ptr<dem::Engine> make() const { return dem::make_engine(GetParam().backend, GetParam().threads); }
+  std::unique_ptr<dem::Engine> make() const {
+    return dem::make_engine(GetParam().backend, GetParam().threads);
+  }
 };
 
-#define ON_EVERY_BACKEND(Suite)                                                                                \
-  INSTANTIATE_TEST_SUITE_P(, Suite,                                                                            \
-                           testing::Values(moraine::BackendChoice{"cpu_1_thread", moraine::dem::Backend::cpu, 1},  \
-                                           moraine::BackendChoice{"reference", moraine::dem::Backend::reference, 1}, \
-                                           moraine::BackendChoice{"cuda", moraine::dem::Backend::cuda, 1}),        \
-                           [](const auto& info) { return info.param.name; })
+#define ON_EVERY_BACKEND(Suite)                                                                 \
+  INSTANTIATE_TEST_SUITE_P(                                                                     \
+      , Suite,                                                                                  \
+      testing::Values(moraine::BackendChoice{"cpu_1_thread", moraine::dem::Backend::cpu, 1},    \
+                      moraine::BackendChoice{"reference", moraine::dem::Backend::reference, 1}, \
+                      moraine::BackendChoice{"cuda", moraine::dem::Backend::cuda, 1}),          \
+      [](const auto& info) { return info.param.name; })
 
 }  // namespace moraine

@@ -54,7 +54,8 @@ output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, d
 Strength strength_of(const std::vector<output::Row>& rows) {
   Strength s{0, 0, 0, 0, rows.back().dilation_diameters};
   for (const output::Row& r : rows)
-    if (r.shear_friction > s.peak) s.peak = r.shear_friction, s.peak_strain = r.shear_strain;
+    if (r.shear_strain > 0 && r.shear_friction > s.peak)
+      s.peak = r.shear_friction, s.peak_strain = r.shear_strain;
   const double last = rows.back().shear_strain;
   std::size_t count = 0;
   for (const output::Row& r : rows) {
@@ -106,7 +107,8 @@ std::string summary(const std::vector<cases::Stage>& stages, const std::vector<o
                 all_in > 0 ? std::abs(all_residue) / all_in : 0.0);
   out += text;
   return out +
-         "peak: largest value; smooth: largest mean over a shear strain of 0.02; ultimate: mean over the "
+         "peak: largest value at a strain above 0; smooth: largest mean over a shear strain of 0.02; "
+         "ultimate: mean over the "
          "last third of the strain\n"
          "energy in: work of wall and driven layer, and what the grains fell\n";
 }

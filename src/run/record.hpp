@@ -13,7 +13,8 @@ output::Row row_of(std::size_t index, const Stage& stage, const dem::State& stat
                    double energy_0);
 
 // How the friction curve of a shear stage is read.
-//   peak: the largest value; smoothed_peak: of the mean over a window of shear strain 0.02
+//   peak: the largest value, but not the first, when the wall may still be finding its place
+//   smoothed_peak: the largest mean over a window of shear strain 0.02
 //   ultimate: the mean over the last third of the strain
 struct Strength {
   double peak, peak_strain, smoothed_peak, ultimate;
