@@ -584,7 +584,9 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
         const double speed = fastest(drive);
         course.moved += 2 * speed * dt;
         course.moved_near += 2 * speed * dt;
-        if (!(course.moved < margin_)) {
+        // One step must stay in hand: a contact that opens in this step still belongs in the near list, for
+        // what its spring gives up.
+        if (!(course.moved + 2 * speed * dt < margin_)) {
           reason = Pause::search;
           break;
         }
