@@ -13,10 +13,14 @@ struct Reaction {
   double shear_force = 0;    // N, x force on the top layer
   double wall_damping = 0;   // N, the viscous part of wall_force
   double layer_damping = 0;  // N, of shear_force
-};
-struct Dissipation {
-  double slip = 0;           // J, in the step
-  double damping_power = 0;  // W, of viscous forces on grains, at the velocities of the step
+  double damping_power =
+      0;  // W, of viscous forces on grains, at the velocities of the step (the layer's: n - 1/2)
+
+  MORAINE_HD void add(const Reaction& r) {
+    wall_force += r.wall_force, shear_force += r.shear_force;
+    wall_damping += r.wall_damping, layer_damping += r.layer_damping;
+    damping_power += r.damping_power;
+  }
 };
 
 struct Drive {
@@ -42,16 +46,13 @@ struct Drive {
     if (s.shear.drive == Shear::Drive::velocity)
       ledger.layers -= 0.5 * (before.shear_force + at.shear_force) * layer_u * s.dt;
     if (s.shear.drive == Shear::Drive::stress) ledger.layers += s.shear.stress * area * layer_u * s.dt;
-  }
-  // To be called after close, for the same step.
-  MORAINE_HD void account(const Scene& s, const Dissipation& d) {
-    const double power = viscous_power(d);
-    ledger.slip += d.slip;
+    const double power = viscous_power();
     ledger.viscous += 0.5 * (ledger.viscous_power + power) * s.dt;
     ledger.viscous_power = power;
   }
-  MORAINE_HD double viscous_power(const Dissipation& d) const {
-    return -d.damping_power - at.wall_damping * wall_v_now - at.layer_damping * (layer_u_now - layer_u);
+  // W, that viscous contacts take.
+  MORAINE_HD double viscous_power() const {
+    return -at.damping_power - at.wall_damping * wall_v_now - at.layer_damping * (layer_u_now - layer_u);
   }
   MORAINE_HD void take(const Scene& s, const Reaction& reaction) {
     at = reaction;

@@ -38,7 +38,7 @@ struct GatherView {
   const Index* neighbour;
   Spring<double>*spring, *wall_spring;
   Reaction* reaction;  // one for each chunk, as the next two
-  Dissipation* dissipation;
+  double* slip;
   double* fastest2;  // by component, m2/s2
   Control* control;
 
@@ -54,7 +54,7 @@ struct SumChunk {
   MORAINE_HD void operator()(std::int64_t c) const {
     if (w.control->stale) return;
     Reaction reaction;
-    Dissipation dissipation;
+    double slip = 0;
     Power power;
     for (Index i = static_cast<Index>(c) * w.chunk; i < w.chunk_end(static_cast<Index>(c)); ++i) {
       reaction.wall_force += w.wall_push[i];
@@ -63,11 +63,11 @@ struct SumChunk {
         reaction.shear_force += w.load[i].f.x;
         if (w.damping) reaction.layer_damping += w.damping[i].f.x;
       }
-      dissipation.slip += w.load[i].slip;
+      slip += w.load[i].slip;
       if (w.damping) add_damping_power(power, w.grain[i], w.mobility[i], w.load[i], w.damping[i], dt);
     }
-    dissipation.damping_power = power.total();
-    w.reaction[c] = reaction, w.dissipation[c] = dissipation;
+    reaction.damping_power = power.total();
+    w.reaction[c] = reaction, w.slip[c] = slip;
   }
 };
 
@@ -81,19 +81,15 @@ struct AdvanceDrive {
     c.drive.advance(w.scene);
   }
   MORAINE_HD void close(Drive& drive) const {
-    Reaction reaction;
-    Dissipation dissipation;
-    sum(reaction, dissipation);
-    drive.close(w.scene, reaction);
-    if (w.scene.ledger) drive.account(w.scene, dissipation);
+    drive.close(w.scene, sum_reactions());
+    double slip = 0;
+    for (Index k = 0; k < w.chunks(); ++k) slip += w.slip[k];
+    drive.ledger.slip += slip;
   }
-  MORAINE_HD void sum(Reaction& reaction, Dissipation& dissipation) const {
-    for (Index k = 0; k < w.chunks(); ++k) {
-      reaction.wall_force += w.reaction[k].wall_force, reaction.shear_force += w.reaction[k].shear_force;
-      reaction.wall_damping += w.reaction[k].wall_damping;
-      reaction.layer_damping += w.reaction[k].layer_damping;
-      dissipation.slip += w.dissipation[k].slip, dissipation.damping_power += w.dissipation[k].damping_power;
-    }
+  MORAINE_HD Reaction sum_reactions() const {
+    Reaction sum;
+    for (Index k = 0; k < w.chunks(); ++k) sum.add(w.reaction[k]);
+    return sum;
   }
 };
 
@@ -252,8 +248,7 @@ class GatherEngine final : public Engine {
     for (const WallContact& w : s.wall_contacts)
       wall_springs[2 * static_cast<std::size_t>(w.i) + static_cast<int>(w.wall)] = {w.delta_t, w.slipping};
     wall_spring_.set(wall_springs);
-    reaction_.resize(view_.chunks()), dissipation_.resize(view_.chunks()),
-        fastest2_.resize(3 * view_.chunks());
+    reaction_.resize(view_.chunks()), slip_.resize(view_.chunks()), fastest2_.resize(3 * view_.chunks());
     lost_.resize(view_.chunks());
     Control control;
     control.drive = drive_of(scene, s);
@@ -301,8 +296,8 @@ class GatherEngine final : public Engine {
     if (!control.closed) {
       space_.for_each(view_.chunks(), gather::SumChunk{view_, view_.scene.dt});
       std::vector<Reaction> reactions = reaction_.get();
-      std::vector<Dissipation> dissipations = dissipation_.get();
-      on_host(reactions, dissipations).close(control.drive);
+      std::vector<double> slips = slip_.get();
+      on_host(reactions, slips).close(control.drive);
     }
     for (Index i = 0; i < n_; ++i) append_grain(s, grains[i], rotation[i], loads[i], role_host_[i]);
 
@@ -334,8 +329,7 @@ class GatherEngine final : public Engine {
     view_.rotation = rotation_.data(), view_.mobility = mobility_.data();
     view_.role = role_.data(), view_.row = lists_.row.data(), view_.neighbour = lists_.neighbour.data();
     view_.spring = spring_.data(), view_.wall_spring = wall_spring_.data(), view_.reaction = reaction_.data();
-    view_.dissipation = dissipation_.data(), view_.fastest2 = fastest2_.data(),
-    view_.control = control_.data();
+    view_.slip = slip_.data(), view_.fastest2 = fastest2_.data(), view_.control = control_.data();
   }
 
   void search() {
@@ -369,16 +363,14 @@ class GatherEngine final : public Engine {
     space_.for_each(view_.chunks(), gather::SumChunk{view_, 0});
     Control control = space_.read(control_.data());
     std::vector<Reaction> reactions = reaction_.get();
-    std::vector<Dissipation> dissipations = dissipation_.get();
-    Reaction reaction;
-    Dissipation dissipation;
-    on_host(reactions, dissipations).sum(reaction, dissipation);
+    std::vector<double> slips = slip_.get();
+    const Reaction reaction = on_host(reactions, slips).sum_reactions();
     Drive& drive = control.drive;
     drive.take(view_.scene, reaction);
     drive.half_step(view_.scene, -1);
     drive.take(view_.scene, reaction);  // now that the wall's velocity is that of n - 1/2
     drive.ledger = {};
-    drive.ledger.viscous_power = drive.viscous_power(dissipation);
+    drive.ledger.viscous_power = drive.viscous_power();
     std::vector<GrainRow> grains = grain_.get();
     std::vector<LoadRow> loads = load_.get();
     for (Index i = 0; i < n_; ++i) {
@@ -389,10 +381,9 @@ class GatherEngine final : public Engine {
     grain_.set(grains), load_.set(loads), control_.set({control});
   }
 
-  gather::AdvanceDrive on_host(std::vector<Reaction>& reactions,
-                               std::vector<Dissipation>& dissipations) const {
+  gather::AdvanceDrive on_host(std::vector<Reaction>& reactions, std::vector<double>& slips) const {
     GatherView host = view_;
-    host.reaction = reactions.data(), host.dissipation = dissipations.data();
+    host.reaction = reactions.data(), host.slip = slips.data();
     return {host};
   }
 
@@ -436,7 +427,7 @@ class GatherEngine final : public Engine {
   Array<Role> role_;
   Array<Spring<double>> spring_, old_spring_, wall_spring_;
   Array<Reaction> reaction_;
-  Array<Dissipation> dissipation_;
+  Array<double> slip_;  // J, dissipated in the step, one for each chunk
   Array<Control> control_;
   Array<Index> lost_;
   std::int64_t rebuilds_ = 0;

@@ -147,7 +147,7 @@ void PairEngine::load(const Scene& scene, const State& s) {
   drive.half_step(scene, -1);
   drive.take(scene, sum_reactions());  // now that the wall's velocity is that of n - 1/2
   drive.ledger = {};
-  drive.ledger.viscous_power = drive.viscous_power(pending_dissipation(0));
+  drive.ledger.viscous_power = drive.viscous_power();
   for (Index i = 0; i < n_; ++i) {
     LoadRow& l = load_.data()[i];
     half_step_back(grain_.data()[i], mobility_.data()[i], l.f, l.torque, scene.dt);
@@ -237,37 +237,23 @@ double PairEngine::fastest(const Drive& drive) const {
 
 Reaction PairEngine::sum_reactions() const {
   Reaction sum;
-  for (const Chunk& chunk : chunks_) {
-    sum.wall_force += chunk.reaction.wall_force;
-    sum.shear_force += chunk.reaction.shear_force;
-    sum.wall_damping += chunk.reaction.wall_damping;
-    sum.layer_damping += chunk.reaction.layer_damping;
-  }
+  for (const Chunk& chunk : chunks_) sum.add(chunk.reaction);
   return sum;
 }
 
-Dissipation PairEngine::sum_dissipation() const {
-  Dissipation sum;
-  for (const Chunk& chunk : chunks_) {
-    sum.slip += chunk.dissipation.slip;
-    sum.damping_power += chunk.dissipation.damping_power;
-  }
+double PairEngine::sum_slip() const {
+  double sum = 0;
+  for (const Chunk& chunk : chunks_) sum += chunk.slip;
   return sum;
 }
 
 // Of the present step, which integrate will add up only when it comes to it; the same sums in the same order.
-Dissipation PairEngine::pending_dissipation(double dt) const {
-  Dissipation sum;
+double PairEngine::pending_slip() const {
+  double sum = 0;
   for (const Chunk& chunk : chunks_) {
     double slip = 0;
-    Power power;
-    for (Index i = chunk.begin; i < chunk.end; ++i) {
-      slip += load_.data()[i].slip;
-      if (damping_.size() > 0)
-        add_damping_power(power, grain_.data()[i], mobility_.data()[i], load_.data()[i], damping_.data()[i],
-                          dt);
-    }
-    sum.slip += slip, sum.damping_power += power.total();
+    for (Index i = chunk.begin; i < chunk.end; ++i) slip += load_.data()[i].slip;
+    sum += slip;
   }
   return sum;
 }
@@ -473,6 +459,15 @@ void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt) {
     chunk.reaction.shear_force += load[i].f.x;
     if constexpr (F.viscous && F.ledger) chunk.reaction.layer_damping += damping_.data()[i].f.x;
   }
+  if constexpr (F.viscous && F.ledger) {
+    Power power;
+    for (Index i = chunk.begin; i < chunk.end; ++i) {
+      LoadRow& damping = damping_.data()[i];
+      add_damping_power(power, grain_.data()[i], mobility_.data()[i], load[i], damping, dt);
+      damping = {};
+    }
+    chunk.reaction.damping_power = power.total();
+  }
 }
 
 template <Features F>
@@ -480,8 +475,9 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive) {
   GrainRow* const grain = grain_.data();
   if (scene_.shear.drive == Shear::Drive::stress)
     for (const Index i : chunk.top_layer) grain[i].v.x = drive.layer_u;
-  const Pack zero(0.0), dt(scene_.dt, scene_.dt, scene_.dt, 0), half_dt = Pack(0.5) * dt;
-  Pack sum_f = zero, power = zero, fastest2 = zero;
+  const Pack zero(0.0), dt(scene_.dt, scene_.dt, scene_.dt, 0);
+  [[maybe_unused]] const Pack half_dt = Pack(0.5) * dt;
+  Pack sum_f = zero, fastest2 = zero;
   for (Index i = chunk.begin; i < chunk.end; ++i) {
     const Pack m = row(mobility_.data()[i]);
     const Pack inverse_mass = __builtin_shuffle(m.v, zero.v, Pack::Bits{0, 0, 1, 4});
@@ -490,12 +486,6 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive) {
     LoadRow& load = load_.data()[i];
     const Pack f = row(load.f), torque = row(load.torque);
     const Pack acceleration = fma(f, inverse_mass, gravity), spin_acceleration = torque * inverse_inertia;
-    if constexpr (F.viscous && F.ledger) {  // as Power::add, at the velocities of step n
-      LoadRow& damping = damping_.data()[i];
-      power = fma(row(damping.f), fma(half_dt, acceleration, row(grain[i].v)), power);
-      power = fma(row(damping.torque), fma(half_dt, spin_acceleration, row(grain[i].omega)), power);
-      damping = {};
-    }
     Kinematics<Pack> k{row(grain[i].x), row(grain[i].v), row(grain[i].omega), rotation_.data()[i]};
     leapfrog(k, acceleration, spin_acceleration, dt);
     set_row(grain[i].x, k.x), set_row(grain[i].v, k.v), set_row(grain[i].omega, k.omega);
@@ -511,7 +501,7 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive) {
   if constexpr (F.viscous)
     if (scene_.shear.drive == Shear::Drive::stress)
       for (const Index i : chunk.top_layer) now_.data()[i].v.x = drive.layer_u_ahead;
-  chunk.dissipation = {sum_f[3], power[0] + (power[1] + power[2])};
+  chunk.slip = sum_f[3];
   for (int a = 0; a < 3; ++a) chunk.fastest2[a] = fastest2[a];
 }
 
@@ -574,7 +564,7 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
           if (!closed) drive.close(scene_, sum_reactions());
           drive.advance(scene_);
         }
-        if (F.ledger && !closed) drive.account(scene_, sum_dissipation());
+        if (!closed) drive.ledger.slip += sum_slip();
         closed = false;
         if (guard &&
             std::any_of(chunks_.begin(), chunks_.end(), [](const Chunk& c) { return c.lost >= 0; })) {
@@ -634,7 +624,7 @@ State PairEngine::state() const {
   Drive drive = course_.drive;
   if (!closed_) {
     drive.close(scene_, sum_reactions());
-    if (scene_.ledger) drive.account(scene_, pending_dissipation(scene_.dt));
+    drive.ledger.slip += pending_slip();
   }
   for (Index i = 0; i < n_; ++i) {
     const Pack& rotation = rotation_.data()[i];

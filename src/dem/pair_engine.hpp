@@ -71,7 +71,7 @@ class PairEngine final : public Engine {
     std::vector<Index> outgoing;
     std::vector<Index> top_layer;
     Reaction reaction;
-    Dissipation dissipation;
+    double slip;         // J, dissipated in the step
     double fastest2[3];  // largest v^2 by component
     Index lost = -1;     // a grain that went wrong
   };
@@ -88,8 +88,8 @@ class PairEngine final : public Engine {
   double choose_near_margin(double speed, double moved) const;
   double fastest(const Drive& drive) const;
   Reaction sum_reactions() const;
-  Dissipation sum_dissipation() const;
-  Dissipation pending_dissipation(double dt) const;
+  double sum_slip() const;
+  double pending_slip() const;
 
   template <Features F>
   Pause run(std::int64_t& steps, bool& at_forces);

@@ -24,6 +24,7 @@ const std::vector<Named>& scenes() {
                          {"small box", cloud(22, 0.065, 5)}};
     a[1].bed.scene.grain.mu_d = a[1].bed.scene.wall.mu_d = 0.3;
     a[2].bed.scene.shear = {Shear::Drive::stress, 0, 400, false};
+    a[2].bed.scene.grain.gamma_n = a[2].bed.scene.grain.gamma_t = 5;
     a[3].bed.scene.shear.hold_z = true;
     a[4].bed.scene.top_wall.amplitude = 200, a[4].bed.scene.top_wall.frequency = 30;
     a[4].bed.scene.wall.k_t = 0, a[4].bed.scene.ledger = false;
