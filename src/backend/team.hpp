@@ -10,6 +10,20 @@ namespace moraine {
 // Cores that this process may use.
 inline int available_cores() { return omp_get_num_procs(); }
 
+// Spins briefly; then lets others run, for the machine may be shared.
+template <class Ready>
+void wait_until(Ready&& ready) {
+  for (int spins = 0; !ready(); ++spins) {
+    if (spins < 4000) {
+#if defined(__x86_64__)
+      __builtin_ia32_pause();
+#endif
+    } else {
+      sched_yield();
+    }
+  }
+}
+
 class Barrier {
  public:
   explicit Barrier(int members) : members_(members) {}
@@ -22,16 +36,7 @@ class Barrier {
       phase_.store(phase + 1, std::memory_order_release);
       return;
     }
-    // Spin briefly; then let others run, for the machine may be shared.
-    for (int spins = 0; phase_.load(std::memory_order_acquire) == phase; ++spins) {
-      if (spins < 4000) {
-#if defined(__x86_64__)
-        __builtin_ia32_pause();
-#endif
-      } else {
-        sched_yield();
-      }
-    }
+    wait_until([&] { return phase_.load(std::memory_order_acquire) != phase; });
   }
 
  private:

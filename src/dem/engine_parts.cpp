@@ -39,7 +39,7 @@ std::vector<GrainRow> grain_rows(const Scene& scene, const State& s) {
   std::vector<GrainRow> rows(s.size());
   for (Index i = 0; i < s.size(); ++i) {
     GrainRow& g = rows[i];
-    g = {s.x[i], s.r[i], s.v[i], s.r[i], s.omega[i], 0};
+    g = {s.x[i], s.r[i], s.v[i], s.r[i], s.omega[i], 0, s.rotation[i], 0};
     if (s.role[i] == Role::free) continue;
     const double u = s.role[i] == Role::bottom                     ? 0
                      : scene.shear.drive == Shear::Drive::velocity ? scene.shear.velocity
@@ -84,12 +84,12 @@ void half_step_back(GrainRow& g, const Mobility& m, const Vec3d& f, const Vec3d&
   g.omega = axpy(-0.5 * dt, m.spin_acceleration(torque), g.omega);
 }
 
-void append_grain(State& s, const GrainRow& g, const Vec3d& rotation, const LoadRow& load, Role role) {
+void append_grain(State& s, const GrainRow& g, const LoadRow& load, Role role) {
   s.r.push_back(g.r);
   s.x.push_back(g.x);
   s.v.push_back(g.v);
   s.omega.push_back(g.omega);
-  s.rotation.push_back(rotation);
+  s.rotation.push_back(g.rotation);
   s.force.push_back(load.f);
   s.torque.push_back(load.torque);
   s.role.push_back(role);

@@ -36,7 +36,7 @@ MORAINE_HD WallAction wall_action(const ContactParameters& law, double dt, const
       wall_now{0, 0, top ? drive.wall_v_ahead : 0.0};
   const Action<double> a = contact_law<F>(law, dt, g, {grain.v - wall_v, grain.omega, still},
                                           {now.v - wall_now, now.omega, still}, spring);
-  return {a.f, -g.l_i * a.n_x_f, a.slip, a.f_viscous, -g.l_i * a.n_x_f_viscous};
+  return {a.f, g.l_i * a.f_x_n, a.slip, a.f_viscous, g.l_i * a.f_x_n_viscous};
 }
 
 // The forces of viscous contacts on a grain do this much work at step n, when its velocity is half a step
@@ -59,7 +59,7 @@ Error lost_grain(const Scene& scene, const Drive& drive, const GrainRow& g, Inde
 void half_step_back(GrainRow& grain, const Mobility& mobility, const Vec3d& f, const Vec3d& torque,
                     double dt);
 
-void append_grain(State& s, const GrainRow& grain, const Vec3d& rotation, const LoadRow& load, Role role);
+void append_grain(State& s, const GrainRow& grain, const LoadRow& load, Role role);
 // Only if they touch.
 void append_contact(State& s, const Scene& scene, const Sides& sides, const GrainRow& a, const GrainRow& b,
                     Index i, Index j, const Spring<double>& spring);

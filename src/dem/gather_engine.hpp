@@ -31,7 +31,6 @@ struct GatherView {
   NowRow* now;
   LoadRow *load, *damping;           // damping: the viscous part, where the ledger asks for it
   double *wall_push, *wall_damping;  // N, each grain's force on the top wall; its viscous part
-  Vec3d* rotation;
   const Mobility* mobility;
   const Role* role;
   const std::int64_t* row;
@@ -104,9 +103,9 @@ struct Integrate {
     const Triple dt(Vec3d{w.scene.dt, w.scene.dt, w.scene.dt});
     const Triple acceleration = w.mobility[i].acceleration(w.load[i].f);
     const Triple spin_acceleration = w.mobility[i].spin_acceleration(w.load[i].torque);
-    Kinematics<Triple> k{g.x, g.v, g.omega, w.rotation[i]};
+    Kinematics<Triple> k{g.x, g.v, g.omega, g.rotation};
     leapfrog(k, acceleration, spin_acceleration, dt);
-    g.x = k.x, g.v = k.v, g.omega = k.omega, w.rotation[i] = k.rotation;
+    g.x = k.x, g.v = k.v, g.omega = k.omega, g.rotation = k.rotation;
     if constexpr (F.viscous) {
       w.now[i] = {axpy<double>(0.5 * w.scene.dt, acceleration, g.v), 0,
                   axpy<double>(0.5 * w.scene.dt, spin_acceleration, g.omega), 0};
@@ -162,14 +161,18 @@ struct Forces {
         at = {p.v - q.v, p.omega, q.omega};
       }
       const Action<double> action = contact_law<F>(w.scene.grain, dt, g, before, at, w.spring[k]);
-      const auto share = [&](const Vec3d& f, const Vec3d& n_x_f, double slip, LoadRow& to) {
+      // A pair of an earlier chunk comes by way of a slot, where its torque has been rounded by itself.
+      const bool by_slot = !first && i / w.chunk != j / w.chunk;
+      const auto share = [&](const Vec3d& f, const Vec3d& f_x_n, double slip, LoadRow& to) {
         if (first)
-          to.add(f, -g.l_i * n_x_f, slip);
+          to.add(f, g.l_i, f_x_n, slip);
+        else if (by_slot)
+          to.add(-f, g.l_j * f_x_n, 0);
         else
-          to.add(-f, -g.l_j * n_x_f, 0);
+          to.add(-f, g.l_j, f_x_n, 0);
       };
-      share(action.f, action.n_x_f, action.slip, sum);
-      if constexpr (F.viscous && F.ledger) share(action.f_viscous, action.n_x_f_viscous, 0, damping);
+      share(action.f, action.f_x_n, action.slip, sum);
+      if constexpr (F.viscous && F.ledger) share(action.f_viscous, action.f_x_n_viscous, 0, damping);
     }
     w.wall_push[i] = w.wall_damping[i] = 0;
     if (w.scene.floor) add_wall(i, WallName::floor, sum, damping);
@@ -233,7 +236,7 @@ class GatherEngine final : public Engine {
     rebuilds_ = 0;
 
     grain_.set(grain_rows(scene, s));
-    role_.set(s.role), rotation_.set(s.rotation);
+    role_.set(s.role);
     std::vector<LoadRow> loads(n_);
     std::vector<Mobility> mobilities(n_);
     for (Index i = 0; i < n_; ++i) {
@@ -292,14 +295,13 @@ class GatherEngine final : public Engine {
     Control control = space_.read(control_.data());
     const std::vector<GrainRow> grains = grain_.get();
     const std::vector<LoadRow> loads = load_.get();
-    const std::vector<Vec3d> rotation = rotation_.get();
     if (!control.closed) {
       space_.for_each(view_.chunks(), gather::SumChunk{view_, view_.scene.dt});
       std::vector<Reaction> reactions = reaction_.get();
       std::vector<double> slips = slip_.get();
       on_host(reactions, slips).close(control.drive);
     }
-    for (Index i = 0; i < n_; ++i) append_grain(s, grains[i], rotation[i], loads[i], role_host_[i]);
+    for (Index i = 0; i < n_; ++i) append_grain(s, grains[i], loads[i], role_host_[i]);
 
     const std::vector<std::int64_t> row = lists_.row.get();
     const std::vector<Index> neighbour = lists_.neighbour.get();
@@ -326,7 +328,7 @@ class GatherEngine final : public Engine {
     view_.grain = grain_.data(), view_.now = now_.data(), view_.load = load_.data();
     view_.damping = damping_.size() > 0 ? damping_.data() : nullptr;
     view_.wall_push = wall_push_.data(), view_.wall_damping = wall_damping_.data();
-    view_.rotation = rotation_.data(), view_.mobility = mobility_.data();
+    view_.mobility = mobility_.data();
     view_.role = role_.data(), view_.row = lists_.row.data(), view_.neighbour = lists_.neighbour.data();
     view_.spring = spring_.data(), view_.wall_spring = wall_spring_.data(), view_.reaction = reaction_.data();
     view_.slip = slip_.data(), view_.fastest2 = fastest2_.data(), view_.control = control_.data();
@@ -422,7 +424,6 @@ class GatherEngine final : public Engine {
   Array<NowRow> now_;
   Array<LoadRow> load_, damping_;
   Array<double> wall_push_, wall_damping_, fastest2_;
-  Array<Vec3d> rotation_;
   Array<Mobility> mobility_;
   Array<Role> role_;
   Array<Spring<double>> spring_, old_spring_, wall_spring_;

@@ -1,5 +1,5 @@
-// Memory layout of what the contact loop reads and writes for each grain: three and two SIMD rows. Reading
-// and writing are kept apart so that threads never write into what others read.
+// Memory layout of what the contact loop reads and writes for each grain, in SIMD rows: two cache lines that it
+// reads and one that it adds to. They are kept apart so that threads never write into what others read.
 #pragma once
 #include <algorithm>
 
@@ -8,13 +8,15 @@
 
 namespace moraine::dem {
 
-struct alignas(32) GrainRow {
+struct alignas(64) GrainRow {
   Vec3d x;
   double r;
   Vec3d v;
   double r_again;  // so that one row difference gives v_i - v_j and another row sum r_i + r_j
   Vec3d omega;
-  double unused;
+  double unused_omega;
+  Vec3d rotation;  // rad, integral of omega
+  double unused_rotation;
 };
 
 // Velocities at step n, needed by viscous contacts only.
@@ -26,7 +28,7 @@ struct alignas(32) NowRow {
 };
 
 // Sums over a grain's contacts.
-struct alignas(32) LoadRow {
+struct alignas(64) LoadRow {
   Vec3d f;
   double slip;  // J, of the contacts in which the grain is i
   Vec3d torque;
@@ -34,6 +36,9 @@ struct alignas(32) LoadRow {
 
   MORAINE_HD void add(const Vec3d& force, const Vec3d& moment, double slipped) {
     f += force, torque += moment, slip += slipped;
+  }
+  MORAINE_HD void add(const Vec3d& force, double lever, const Vec3d& f_x_n, double slipped) {
+    f += force, torque = axpy(lever, f_x_n, torque), slip += slipped;
   }
 };
 

@@ -13,7 +13,7 @@ namespace {
 constexpr Features all_features{true, true, true, false};
 
 GrainRow grain_at(const State& s, Index i, const std::vector<Vec3d>& v, const std::vector<Vec3d>& omega) {
-  return {s.x[i], s.r[i], v[i], s.r[i], omega[i], 0};
+  return {s.x[i], s.r[i], v[i], s.r[i], omega[i], 0, {0, 0, 0}, 0};
 }
 
 struct Velocities {

@@ -13,9 +13,9 @@ namespace moraine::dem {
 namespace {
 
 constexpr Index no_link = -1;
-constexpr int group_block = 32;  // groups of four that go through the three phases together
+constexpr int group_block = 16;  // groups of four that go through the three phases together
 constexpr int steps_between_checks = 256;
-constexpr int steps_near_list_should_last = 40;
+constexpr int steps_near_list_should_last = 80;
 
 template <class Row>
 Pack row(const Row& v) {
@@ -32,28 +32,28 @@ void PairEngine::PairList::add(Index i, Index j, Index target, const Spring<doub
   const auto lane = static_cast<int>(count % 4);
   if (lane == 0) {
     pairs.emplace_back();
-    springs.push_back({0.0, 0.0, 0.0, 0.0});
+    springs.push_back({0.0, 0.0, 0.0});
+    slipping.push_back(0.0);
   }
   PairGroup& p = pairs.back();
-  p.i[lane] = i, p.j[lane] = j, p.target[lane] = target;
-  SpringGroup& g = springs.back();
-  g.x.v[lane] = s.delta_t.x, g.y.v[lane] = s.delta_t.y, g.z.v[lane] = s.delta_t.z,
-  g.slipping.v[lane] = s.slipping;
+  p.i[lane] = row_bytes * i, p.j[lane] = row_bytes * j, p.target[lane] = row_bytes * target;
+  for (int a = 0; a < 3; ++a) springs.back()[a].v[lane] = s.delta_t[a];
+  slipping.back().v[lane] = s.slipping;
   ++count;
 }
 
 void PairEngine::PairList::pad(Index first_dummy) {
   if (count % 4 == 0) return;
   for (auto lane = static_cast<int>(count % 4); lane < 4; ++lane) {
-    pairs.back().i[lane] = first_dummy;
-    pairs.back().j[lane] = pairs.back().target[lane] = first_dummy + 1;
+    pairs.back().i[lane] = row_bytes * first_dummy;
+    pairs.back().j[lane] = pairs.back().target[lane] = row_bytes * (first_dummy + 1);
   }
 }
 
 Spring<double> PairEngine::PairList::spring(std::int64_t k) const {
-  const SpringGroup& g = springs[k / 4];
+  const Vec3<Pack>& s = springs[k / 4];
   const int lane = static_cast<int>(k % 4);
-  return {{g.x[lane], g.y[lane], g.z[lane]}, g.slipping[lane]};
+  return {{s.x[lane], s.y[lane], s.z[lane]}, slipping[k / 4][lane]};
 }
 
 PairEngine::PairEngine(int threads) : threads_wanted_(threads) { space_.threads = std::max(1, threads); }
@@ -95,8 +95,10 @@ void PairEngine::load(const Scene& scene, const State& s) {
   const Index chunks = chunk_count(n_);
   chunks_.clear();
   chunks_.resize(chunks);
+  pairs_done_ = std::make_unique<Progress[]>(chunks);
+  for (Index c = 0; c < chunks; ++c) pairs_done_[c].step = -1;
   const std::int64_t rows = n_ + 2 * chunks;
-  grain_.resize(rows), load_.resize(rows), rotation_.resize(n_), mobility_.resize(n_), role_.resize(n_);
+  grain_.resize(rows), load_.resize(rows), mobility_.resize(n_), role_.resize(n_);
   const Features features = features_of(scene);
   now_.resize(features.viscous ? rows : 0);
   damping_.resize(features.viscous && features.ledger ? rows : 0);
@@ -107,12 +109,11 @@ void PairEngine::load(const Scene& scene, const State& s) {
   for (Index i = 0; i < n_; ++i) {
     role_.data()[i] = s.role[i];
     mobility_.data()[i] = mobility(scene, s.r[i], s.role[i]);
-    rotation_.data()[i] = Pack(s.rotation[i].x, s.rotation[i].y, s.rotation[i].z, 0);
     load_.data()[i] = {s.force[i], 0, s.torque[i], 0};
   }
   for (std::int64_t k = n_; k < rows; ++k) {  // dummies: pairs that never touch
     const double apart = k % 2 == n_ % 2 ? 0 : 0.25 * (sides_.side.x > 0 ? sides_.side.x : 1.0);
-    grain_.data()[k] = {{apart, 0, 0}, -1e30, {0, 0, 0}, -1e30, {0, 0, 0}, 0};
+    grain_.data()[k] = {{apart, 0, 0}, -1e30, {0, 0, 0}, -1e30, {0, 0, 0}, 0, {0, 0, 0}, 0};
     load_.data()[k] = {};
     if (features.viscous) now_.data()[k] = {};
   }
@@ -143,9 +144,10 @@ void PairEngine::load(const Scene& scene, const State& s) {
     for (Index i = 0; i < n_; ++i) now_.data()[i] = {grain_.data()[i].v, 0, grain_.data()[i].omega, 0};
   (this->*evaluate_)(0.0);
   Drive& drive = course_.drive;
-  drive.take(scene, sum_reactions());
+  const Reaction reaction = sum_reactions(drive.step);
+  drive.take(scene, reaction);
   drive.half_step(scene, -1);
-  drive.take(scene, sum_reactions());  // now that the wall's velocity is that of n - 1/2
+  drive.take(scene, reaction);  // now that the wall's velocity is that of n - 1/2
   drive.ledger = {};
   drive.ledger.viscous_power = drive.viscous_power();
   for (Index i = 0; i < n_; ++i) {
@@ -199,8 +201,9 @@ void PairEngine::find_candidates() {
     link.first = static_cast<Index>(rows + slots);
     slots += link.size;
   }
-  if (rows + slots > std::numeric_limits<Index>::max())
-    throw error("too many contacts for 32-bit indices: ", slots);
+  if ((rows + slots) * row_bytes > std::numeric_limits<Offset>::max())
+    throw error("too many grains for one process: ", n_, " grains and ", slots,
+                " pairs across chunks; there is room for 67 million in all");
   for (Host::Array<LoadRow>* loads : {&load_, &damping_}) {
     if (loads->size() == 0) continue;
     if (rows + slots > loads->size()) {  // keep what grains and dummies have
@@ -231,20 +234,27 @@ double PairEngine::choose_near_margin(double speed, double moved) const {
 double PairEngine::fastest(const Drive& drive) const {
   double v2[3] = {0, 0, 0};
   for (const Chunk& chunk : chunks_)
-    for (int a = 0; a < 3; ++a) v2[a] = std::max(v2[a], chunk.fastest2[a]);
+    for (int a = 0; a < 3; ++a) v2[a] = std::max(v2[a], chunk.at(drive.step - 1).fastest2[a]);
   return std::max(std::sqrt(v2[0] + v2[1] + v2[2]), std::abs(drive.wall_v));
 }
 
-Reaction PairEngine::sum_reactions() const {
+Reaction PairEngine::sum_reactions(std::int64_t step) const {
   Reaction sum;
-  for (const Chunk& chunk : chunks_) sum.add(chunk.reaction);
+  for (const Chunk& chunk : chunks_) sum.add(chunk.at(step).reaction);
   return sum;
 }
 
-double PairEngine::sum_slip() const {
+double PairEngine::sum_slip(std::int64_t step) const {
   double sum = 0;
-  for (const Chunk& chunk : chunks_) sum += chunk.slip;
+  for (const Chunk& chunk : chunks_) sum += chunk.at(step).slip;
   return sum;
+}
+
+// Whether all chunks that read this one's grains or send it shares have evaluated their pairs.
+bool PairEngine::others_are_done(const Chunk& chunk, std::int64_t step) const {
+  return std::all_of(chunk.incoming.begin(), chunk.incoming.end(), [&](Index l) {
+    return pairs_done_[links_[l].from].step.load(std::memory_order_acquire) == step;
+  });
 }
 
 // Of the present step, which integrate will add up only when it comes to it; the same sums in the same order.
@@ -268,16 +278,17 @@ void PairEngine::rebuild_near(Chunk& chunk, const Drive& drive, double near_marg
     list.clear();
     std::int64_t k = 0;  // both lists are sorted by (i, j), so the springs are found by walking along
     for (const Candidate& c : chunk.candidates[part]) {
-      const Vec3d d = nearest_image(sides_, grain[c.i].x - grain[c.j].x);
+      const Vec3d plain = grain[c.i].x - grain[c.j].x, d = nearest_image(sides_, plain);
       const double reach = grain[c.i].r + grain[c.j].r + near_margin;
       if (dot(d, d) >= reach * reach) continue;
       const auto earlier = [&](std::int64_t q) {
         const PairGroup& g = old.pairs[q / 4];
-        return g.i[q % 4] != c.i ? g.i[q % 4] < c.i : g.j[q % 4] < c.j;
+        const Index i = g.first(q % 4);
+        return i != c.i ? i < c.i : g.second(q % 4) < c.j;
       };
       while (k < old.count && earlier(k)) ++k;
       const bool known =
-          k < old.count && old.pairs[k / 4].i[k % 4] == c.i && old.pairs[k / 4].j[k % 4] == c.j;
+          k < old.count && old.pairs[k / 4].first(k % 4) == c.i && old.pairs[k / 4].second(k % 4) == c.j;
       Index target = c.j;
       if (part == 1) {
         Link& link = links_[c.link];
@@ -285,6 +296,9 @@ void PairEngine::rebuild_near(Chunk& chunk, const Drive& drive, double near_marg
         slot_owner_.data()[target - n_ - 2 * static_cast<Index>(chunks_.size())] = c.j;
       }
       list.add(c.i, c.j, target, known ? old.spring(k) : Spring<double>{{0, 0, 0}, 0});
+      if (const auto group = static_cast<Index>(list.pairs.size() - 1);
+          !(d == plain) && (list.across_sides.empty() || list.across_sides.back() != group))
+        list.across_sides.push_back(group);
     }
     list.pad(dummy);
     std::swap(old, list);
@@ -316,9 +330,13 @@ void PairEngine::pair_forces(Chunk& chunk, double dt) {
 // several at once.
 template <Features F>
 void PairEngine::pair_forces(PairList& list, double dt) {
-  const GrainRow* const grain = grain_.data();
-  [[maybe_unused]] const NowRow* const now = now_.data();
-  LoadRow* const load = load_.data();
+  const auto grain = [first = reinterpret_cast<const char*>(grain_.data())](Offset at) -> const GrainRow& {
+    return *reinterpret_cast<const GrainRow*>(first + 2 * static_cast<std::size_t>(at));
+  };
+  [[maybe_unused]] const auto now = [first = reinterpret_cast<const char*>(now_.data())](
+                                        Offset at) -> const NowRow& {
+    return *reinterpret_cast<const NowRow*>(first + at);
+  };
   const ContactParameters law = scene_.grain;
   const Sides sides = sides_;
   const Pack minus_but_last(-1, -1, -1, 1);
@@ -328,13 +346,28 @@ void PairEngine::pair_forces(PairList& list, double dt) {
     Pack r_sum, r_difference;
     Motion<Pack> before;
     [[no_unique_address]] std::conditional_t<F.viscous, Motion<Pack>, std::tuple<>> now;
+
+    const Motion<Pack>& at_step() const {  // for what only viscous contacts ask
+      if constexpr (F.viscous)
+        return now;
+      else
+        return before;
+    }
+  };
+  struct Push {
+    Vec3<Pack> f, f_x_n;
+    Pack slip;
   };
   Lanes lanes[group_block];
   Geometry<Pack> geometry[group_block];
-  Trial<Pack> trials[group_block];
-  Action<Pack> actions[group_block];
+  Slide<Pack> slides[group_block];
+  Vec3<Pack> delta_t[group_block];
+  Grip<Pack> grips[group_block];
+  Push push[group_block];
+  [[maybe_unused]] Push damping[F.viscous && F.ledger ? group_block : 1];
 
   const auto groups = static_cast<std::int64_t>(list.pairs.size());
+  auto across = list.across_sides.begin();
   for (std::int64_t start = 0; start < groups; start += group_block) {
     const int block = static_cast<int>(std::min<std::int64_t>(group_block, groups - start));
 
@@ -343,7 +376,7 @@ void PairEngine::pair_forces(PairList& list, double dt) {
       Lanes& q = lanes[g];
       Pack d[4], v[4], wi[4], wj[4];
       for (int k = 0; k < 4; ++k) {
-        const GrainRow &a = grain[p.i[k]], &b = grain[p.j[k]];
+        const GrainRow &a = grain(p.i[k]), &b = grain(p.j[k]);
         d[k] = row(a.x) - row(b.x);
         v[k] = fma(minus_but_last, row(b.v), row(a.v));
         if constexpr (F.friction) wi[k] = row(a.omega), wj[k] = row(b.omega);
@@ -359,7 +392,7 @@ void PairEngine::pair_forces(PairList& list, double dt) {
       }
       if constexpr (F.viscous) {
         for (int k = 0; k < 4; ++k) {
-          const NowRow &a = now[p.i[k]], &b = now[p.j[k]];
+          const NowRow &a = now(p.i[k]), &b = now(p.j[k]);
           v[k] = row(a.v) - row(b.v), wi[k] = row(a.omega), wj[k] = row(b.omega);
         }
         transpose(v[0], v[1], v[2], v[3]);
@@ -368,57 +401,58 @@ void PairEngine::pair_forces(PairList& list, double dt) {
         q.now = {{v[0], v[1], v[2]}, {wi[0], wi[1], wi[2]}, {wj[0], wj[1], wj[2]}};
       }
     }
+    for (; across != list.across_sides.end() && *across < start + block; ++across)
+      lanes[*across - start].x_ij = nearest_image(sides, lanes[*across - start].x_ij);
 
     for (int g = 0; g < block; ++g)
-      geometry[g] =
-          between_grains(nearest_image(sides, lanes[g].x_ij), lanes[g].r_sum, lanes[g].r_difference);
-
-    if constexpr (F.friction)
+      geometry[g] = between_grains(lanes[g].x_ij, lanes[g].r_sum, lanes[g].r_difference);
+    if constexpr (F.friction) {
+      for (int g = 0; g < block; ++g) slides[g] = slide(dt, geometry[g], lanes[g].before);
       for (int g = 0; g < block; ++g) {
-        const SpringGroup& s = list.springs[start + g];
-        trials[g] = stretch(dt, geometry[g], lanes[g].before, Vec3<Pack>{s.x, s.y, s.z});
+        const PairGroup& later = list.pairs[std::min(start + g + group_block, groups - 1)];
+        for (const Offset j : later.j) __builtin_prefetch(&grain(j).x), __builtin_prefetch(&grain(j).omega);
+        delta_t[g] = carry(dt, geometry[g], slides[g], list.springs[start + g]);
       }
-
+    }
+    for (int g = 0; g < block; ++g)
+      grips[g] = grip<F>(law, geometry[g], lanes[g].at_step(), delta_t[g], list.slipping[start + g]);
     for (int g = 0; g < block; ++g) {
-      SpringGroup& s = list.springs[start + g];
-      Spring<Pack> spring{{s.x, s.y, s.z}, F.softening ? s.slipping : Pack(0.0)};
-      if constexpr (F.viscous)
-        actions[g] = respond<F>(law, geometry[g], lanes[g].now, trials[g], spring);
-      else
-        actions[g] = respond<F>(law, geometry[g], lanes[g].before, trials[g], spring);
-      if constexpr (F.friction) s.x = spring.delta_t.x, s.y = spring.delta_t.y, s.z = spring.delta_t.z;
-      if constexpr (F.softening) s.slipping = spring.slipping;
+      Spring<Pack> spring{list.springs[start + g], 0.0};
+      const Action<Pack> a =
+          act<F>(law, geometry[g], lanes[g].at_step(), delta_t[g], grips[g], spring);
+      push[g] = {a.f, a.f_x_n, a.slip};
+      if constexpr (F.viscous && F.ledger) damping[g] = {a.f_viscous, a.f_x_n_viscous, 0.0};
+      if constexpr (F.friction) list.springs[start + g] = spring.delta_t;
+      if constexpr (F.softening) list.slipping[start + g] = spring.slipping;
     }
 
-    for (int g = 0; g < block; ++g) {
-      const PairGroup& p = list.pairs[start + g];
-      const Action<Pack>& action = actions[g];
-      const auto scatter = [&](LoadRow* to, const Vec3<Pack>& force, const Vec3<Pack>& n_x_f,
-                               const Pack& slip) {
-        Pack f[4] = {force.x, force.y, force.z, slip};
+    const auto scatter = [&](LoadRow* loads, const Push* pushes) {
+      const auto load = [first = reinterpret_cast<char*>(loads)](Offset at) -> LoadRow& {
+        return *reinterpret_cast<LoadRow*>(first + at);
+      };
+      for (int g = 0; g < block; ++g) {
+        const PairGroup& p = list.pairs[start + g];
+        const Push& q = pushes[g];
+        Pack f[4] = {q.f.x, q.f.y, q.f.z, F.ledger ? q.slip : Pack(0.0)};
         transpose(f[0], f[1], f[2], f[3]);
-        [[maybe_unused]] Pack ti[4], tj[4];
+        [[maybe_unused]] Pack t[4];
         if constexpr (F.friction) {
-          const Vec3<Pack> on_i = -geometry[g].l_i * n_x_f, on_j = -geometry[g].l_j * n_x_f;
-          ti[0] = on_i.x, ti[1] = on_i.y, ti[2] = on_i.z, ti[3] = 0.0;
-          tj[0] = on_j.x, tj[1] = on_j.y, tj[2] = on_j.z, tj[3] = 0.0;
-          transpose(ti[0], ti[1], ti[2], ti[3]);
-          transpose(tj[0], tj[1], tj[2], tj[3]);
+          t[0] = q.f_x_n.x, t[1] = q.f_x_n.y, t[2] = q.f_x_n.z, t[3] = 0.0;
+          transpose(t[0], t[1], t[2], t[3]);
         }
         for (int k = 0; k < 4; ++k) {
-          LoadRow &a = to[p.i[k]], &b = to[p.target[k]];
+          LoadRow &a = load(p.i[k]), &b = load(p.target[k]);
           set_row(a.f, row(a.f) + f[k]);
-          set_row(b.f, row(b.f) - without_last(f[k]));
+          set_row(b.f, row(b.f) - (F.ledger ? without_last(f[k]) : f[k]));
           if constexpr (F.friction) {
-            set_row(a.torque, row(a.torque) + ti[k]);
-            set_row(b.torque, row(b.torque) + tj[k]);
+            set_row(a.torque, fma(Pack(geometry[g].l_i[k]), t[k], row(a.torque)));
+            set_row(b.torque, fma(Pack(geometry[g].l_j[k]), t[k], row(b.torque)));
           }
         }
-      };
-      scatter(load, action.f, action.n_x_f, F.ledger ? action.slip : Pack(0.0));
-      if constexpr (F.viscous && F.ledger)
-        scatter(damping_.data(), action.f_viscous, action.n_x_f_viscous, 0.0);
-    }
+      }
+    };
+    scatter(load_.data(), push);
+    if constexpr (F.viscous && F.ledger) scatter(damping_.data(), damping);
   }
 }
 
@@ -443,7 +477,8 @@ void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt) {
   collect(chunk, load);
   if constexpr (F.viscous && F.ledger) collect(chunk, damping_.data());
 
-  chunk.reaction = {};
+  Reaction& reaction = chunk.at(drive.step).reaction;
+  reaction = {};
   for (WallPair& w : chunk.walls) {
     const GrainRow& g = grain_.data()[w.i];
     const NowRow now = F.viscous ? now_.data()[w.i] : NowRow{};
@@ -451,13 +486,13 @@ void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt) {
     load[w.i].add(a.f, a.torque, a.slip);
     if constexpr (F.viscous && F.ledger) damping_.data()[w.i].add(a.f_viscous, a.torque_viscous, 0);
     if (w.wall == WallName::top) {
-      chunk.reaction.wall_force -= a.f.z;
-      chunk.reaction.wall_damping -= a.f_viscous.z;
+      reaction.wall_force -= a.f.z;
+      reaction.wall_damping -= a.f_viscous.z;
     }
   }
   for (const Index i : chunk.top_layer) {
-    chunk.reaction.shear_force += load[i].f.x;
-    if constexpr (F.viscous && F.ledger) chunk.reaction.layer_damping += damping_.data()[i].f.x;
+    reaction.shear_force += load[i].f.x;
+    if constexpr (F.viscous && F.ledger) reaction.layer_damping += damping_.data()[i].f.x;
   }
   if constexpr (F.viscous && F.ledger) {
     Power power;
@@ -466,12 +501,12 @@ void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt) {
       add_damping_power(power, grain_.data()[i], mobility_.data()[i], load[i], damping, dt);
       damping = {};
     }
-    chunk.reaction.damping_power = power.total();
+    reaction.damping_power = power.total();
   }
 }
 
 template <Features F>
-void PairEngine::integrate(Chunk& chunk, const Drive& drive) {
+void PairEngine::integrate(Chunk& chunk, const Drive& drive, std::int64_t step) {
   GrainRow* const grain = grain_.data();
   if (scene_.shear.drive == Shear::Drive::stress)
     for (const Index i : chunk.top_layer) grain[i].v.x = drive.layer_u;
@@ -486,10 +521,10 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive) {
     LoadRow& load = load_.data()[i];
     const Pack f = row(load.f), torque = row(load.torque);
     const Pack acceleration = fma(f, inverse_mass, gravity), spin_acceleration = torque * inverse_inertia;
-    Kinematics<Pack> k{row(grain[i].x), row(grain[i].v), row(grain[i].omega), rotation_.data()[i]};
+    Kinematics<Pack> k{row(grain[i].x), row(grain[i].v), row(grain[i].omega), row(grain[i].rotation)};
     leapfrog(k, acceleration, spin_acceleration, dt);
     set_row(grain[i].x, k.x), set_row(grain[i].v, k.v), set_row(grain[i].omega, k.omega);
-    rotation_.data()[i] = k.rotation;
+    set_row(grain[i].rotation, k.rotation);
     if constexpr (F.viscous) {
       set_row(now_.data()[i].v, fma(half_dt, acceleration, k.v));
       set_row(now_.data()[i].omega, fma(half_dt, spin_acceleration, k.omega));
@@ -501,8 +536,9 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive) {
   if constexpr (F.viscous)
     if (scene_.shear.drive == Shear::Drive::stress)
       for (const Index i : chunk.top_layer) now_.data()[i].v.x = drive.layer_u_ahead;
-  chunk.slip = sum_f[3];
-  for (int a = 0; a < 3; ++a) chunk.fastest2[a] = fastest2[a];
+  Chunk::Tally& tally = chunk.at(step);
+  tally.slip = sum_f[3];
+  for (int a = 0; a < 3; ++a) tally.fastest2[a] = fastest2[a];
 }
 
 void PairEngine::check(Chunk& chunk, const Drive& drive) const {
@@ -540,31 +576,32 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
   run_team(space_.threads, [&](int thread) {
     Course course = start;
     Drive& drive = course.drive;
-    bool closed = start_closed, forces_next = start_at_forces;
+    bool closed = start_closed, forces_next = start_at_forces, integrated = false;
     std::int64_t left = wanted;
     Pause reason = Pause::done;
-    const auto mine = [&](auto&& work) {
-      const auto share = [&](std::size_t t) { return t * chunks_.size() / space_.threads; };
-      for (std::size_t c = share(thread); c < share(thread + 1); ++c) work(chunks_[c]);
+    std::vector<Chunk*> waiting;
+    const auto mine = [&](auto&& work) {  // dealt in turns, so that all threads sweep upwards together
+      for (std::size_t c = thread; c < chunks_.size(); c += space_.threads) work(chunks_[c]);
+    };
+    const auto close_and_advance = [&] {
+      if (!closed) drive.close(scene_, sum_reactions(drive.step));
+      drive.advance(scene_);
     };
 
     while (left > 0) {
       if (!forces_next) {
+        const std::int64_t step = drive.step;
         if (layer_by_stress) {  // the layer's new velocity needs all forces on it first
           barrier.wait();
-          if (!closed) drive.close(scene_, sum_reactions());
-          drive.advance(scene_);
+          close_and_advance();
         }
-        mine([&](Chunk& c) { integrate<F>(c, drive); });
+        if (!integrated) mine([&](Chunk& c) { integrate<F>(c, drive, step); });
         const bool guard = left == 1 || left % steps_between_checks == 0;
         if (guard) mine([&](Chunk& c) { check(c, drive); });
         barrier.wait();
 
-        if (!layer_by_stress) {
-          if (!closed) drive.close(scene_, sum_reactions());
-          drive.advance(scene_);
-        }
-        if (!closed) drive.ledger.slip += sum_slip();
+        if (!layer_by_stress) close_and_advance();
+        if (!closed) drive.ledger.slip += sum_slip(step);
         closed = false;
         if (guard &&
             std::any_of(chunks_.begin(), chunks_.end(), [](const Chunk& c) { return c.lost >= 0; })) {
@@ -587,10 +624,25 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
         }
       }
       forces_next = false;
-      mine([&](Chunk& c) { pair_forces<F>(c, dt); });
-      barrier.wait();
-      mine([&](Chunk& c) { finish<F>(c, drive, dt); });
       --left;
+      integrated = left > 0 && !layer_by_stress;
+      const auto complete = [&](Chunk& c) {
+        finish<F>(c, drive, dt);
+        if (integrated) integrate<F>(c, drive, drive.step);
+      };
+      mine([&](Chunk& c) {
+        pair_forces<F>(c, dt);
+        pairs_done_[&c - chunks_.data()].step.store(drive.step, std::memory_order_release);
+        if (others_are_done(c, drive.step))
+          complete(c);
+        else
+          waiting.push_back(&c);
+      });
+      for (Chunk* c : waiting) {
+        wait_until([&] { return others_are_done(*c, drive.step); });
+        complete(*c);
+      }
+      waiting.clear();
     }
     if (thread == 0) course_ = course, closed_ = closed, steps = left, pause = reason;
   });
@@ -623,18 +675,14 @@ State PairEngine::state() const {
   s.x_start = x_start_;
   Drive drive = course_.drive;
   if (!closed_) {
-    drive.close(scene_, sum_reactions());
+    drive.close(scene_, sum_reactions(drive.step));
     drive.ledger.slip += pending_slip();
   }
-  for (Index i = 0; i < n_; ++i) {
-    const Pack& rotation = rotation_.data()[i];
-    append_grain(s, grain_.data()[i], {rotation[0], rotation[1], rotation[2]}, load_.data()[i],
-                 role_.data()[i]);
-  }
+  for (Index i = 0; i < n_; ++i) append_grain(s, grain_.data()[i], load_.data()[i], role_.data()[i]);
   for (const Chunk& chunk : chunks_) {
     for (const PairList& list : chunk.near)
       for (std::int64_t k = 0; k < list.count; ++k) {
-        const Index i = list.pairs[k / 4].i[k % 4], j = list.pairs[k / 4].j[k % 4];
+        const Index i = list.pairs[k / 4].first(k % 4), j = list.pairs[k / 4].second(k % 4);
         append_contact(s, scene_, sides_, grain_.data()[i], grain_.data()[j], i, j, list.spring(k));
       }
     for (const WallPair& w : chunk.walls)

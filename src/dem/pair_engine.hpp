@@ -5,8 +5,13 @@
 // overlapping ones carry force. Pairs belong to the chunk of their lower grain. A pair across two chunks
 // leaves j's share in a slot that j's chunk collects, so that no two threads write to one place and every sum
 // has one order (grain.hpp, SumOrder).
+//
+// So only earlier chunks read a chunk's grains or send it shares. Once their pairs are done, it is finished and
+// its grains move on to the next step at once, while they are still in the cache: one pass over memory and one
+// barrier a step.
 #pragma once
 #include <array>
+#include <atomic>
 #include <memory>
 #include <vector>
 
@@ -31,19 +36,27 @@ class PairEngine final : public Engine {
   int threads() const override { return space_.threads; }
 
  private:
-  struct alignas(32) SpringGroup {
-    Pack x, y, z, slipping;
-  };
+  // Where a grain's rows are, in bytes from the first LoadRow; its GrainRow is twice as far from the first of
+  // those. Kept instead of the index because the loop over pairs would have to compute it.
+  using Offset = std::uint32_t;
+  static constexpr Offset row_bytes = sizeof(LoadRow);
+  static_assert(sizeof(GrainRow) == 2 * row_bytes && sizeof(NowRow) == row_bytes);
+
   struct PairGroup {
-    std::array<Index, 4> i, j;
-    std::array<Index, 4> target;  // where j's share goes: j itself, or a slot
+    std::array<Offset, 4> i, j;
+    std::array<Offset, 4> target;  // where j's share goes: j itself, or a slot
+
+    Index first(int lane) const { return static_cast<Index>(i[lane] / row_bytes); }
+    Index second(int lane) const { return static_cast<Index>(j[lane] / row_bytes); }
   };
   struct PairList {
     std::vector<PairGroup> pairs;
-    std::vector<SpringGroup> springs;
+    std::vector<Vec3<Pack>> springs;
+    std::vector<Pack> slipping;
+    std::vector<Index> across_sides;  // groups with a pair that touches across periodic sides, ascending
     std::int64_t count = 0;
 
-    void clear() { pairs.clear(), springs.clear(), count = 0; }
+    void clear() { pairs.clear(), springs.clear(), slipping.clear(), across_sides.clear(), count = 0; }
     void add(Index i, Index j, Index target, const Spring<double>& spring);
     void pad(Index first_dummy);  // fills the last group with a pair that never touches
     Spring<double> spring(std::int64_t k) const;
@@ -70,10 +83,20 @@ class PairEngine final : public Engine {
     std::vector<Index> incoming;  // links, by the chunk they come from
     std::vector<Index> outgoing;
     std::vector<Index> top_layer;
-    Reaction reaction;
-    double slip;         // J, dissipated in the step
-    double fastest2[3];  // largest v^2 by component
-    Index lost = -1;     // a grain that went wrong
+    // What all threads read after a step. Two, for even and odd steps: a thread may be at the next step already
+    // while another still reads.
+    struct Tally {
+      Reaction reaction;
+      double slip = 0;                 // J, dissipated in the step
+      double fastest2[3] = {0, 0, 0};  // largest v^2 by component
+    } tally[2];
+    Index lost = -1;  // a grain that went wrong
+    const Tally& at(std::int64_t step) const { return tally[step & 1]; }
+    Tally& at(std::int64_t step) { return tally[step & 1]; }
+  };
+  // The last step at which a chunk's pairs have been evaluated, for the chunks that wait for it.
+  struct alignas(64) Progress {
+    std::atomic<std::int64_t> step;
   };
   // Each thread's own copy of what all agree on.
   struct Course {
@@ -87,8 +110,9 @@ class PairEngine final : public Engine {
   void rebuild_near(Chunk& chunk, const Drive& drive, double near_margin);
   double choose_near_margin(double speed, double moved) const;
   double fastest(const Drive& drive) const;
-  Reaction sum_reactions() const;
-  double sum_slip() const;
+  Reaction sum_reactions(std::int64_t step) const;
+  double sum_slip(std::int64_t step) const;
+  bool others_are_done(const Chunk& chunk, std::int64_t step) const;
   double pending_slip() const;
 
   template <Features F>
@@ -103,7 +127,7 @@ class PairEngine final : public Engine {
   template <Features F>
   void finish(Chunk& chunk, const Drive& drive, double dt);
   template <Features F>
-  void integrate(Chunk& chunk, const Drive& drive);
+  void integrate(Chunk& chunk, const Drive& drive, std::int64_t step);
   void check(Chunk& chunk, const Drive& drive) const;
   [[noreturn]] void report_lost() const;
 
@@ -120,13 +144,13 @@ class PairEngine final : public Engine {
   Index chunk_size_ = 0;
   double r_max_ = 0, margin_ = 0;
   std::vector<Chunk> chunks_;
+  std::unique_ptr<Progress[]> pairs_done_;  // by chunk
   std::vector<Link> links_;
   Host::Array<Index> slot_owner_;
   Host::Array<GrainRow> grain_;   // n grains, then two dummies for each chunk
   Host::Array<NowRow> now_;       // viscous only
   Host::Array<LoadRow> load_;     // n grains, dummies, slots
   Host::Array<LoadRow> damping_;  // the viscous part of it, where the ledger asks for it
-  Host::Array<Pack> rotation_;
   Host::Array<Mobility> mobility_;
   Host::Array<Role> role_;
   Neighbours<Host> neighbours_;

@@ -30,6 +30,13 @@ MORAINE_HD Vec3<T> cross(const Vec3<T>& a, const Vec3<T>& b) {
   return {fma(a.y, b.z, -(a.z * b.y)), fma(a.z, b.x, -(a.x * b.z)), fma(a.x, b.y, -(a.y * b.x))};
 }
 
+// a x b + c
+template <class T>
+MORAINE_HD Vec3<T> cross_plus(const Vec3<T>& a, const Vec3<T>& b, const Vec3<T>& c) {
+  return {fma(a.y, b.z, fnma(a.z, b.y, c.x)), fma(a.z, b.x, fnma(a.x, b.z, c.y)),
+          fma(a.x, b.y, fnma(a.y, b.x, c.z))};
+}
+
 // s a + b
 template <class T>
 MORAINE_HD Vec3<T> axpy(const T& s, const Vec3<T>& a, const Vec3<T>& b) {
@@ -40,6 +47,12 @@ MORAINE_HD Vec3<T> axpy(const T& s, const Vec3<T>& a, const Vec3<T>& b) {
 template <class T>
 MORAINE_HD Vec3<T> less(const Vec3<T>& b, const T& s, const Vec3<T>& a) {
   return {fnma(s, a.x, b.x), fnma(s, a.y, b.y), fnma(s, a.z, b.z)};
+}
+
+using moraine::select;
+template <class M, class T>
+MORAINE_HD Vec3<T> select(const M& mask, const Vec3<T>& a, const Vec3<T>& b) {
+  return {select(mask, a.x, b.x), select(mask, a.y, b.y), select(mask, a.z, b.z)};
 }
 
 using Vec3d = Vec3<double>;

@@ -75,15 +75,15 @@ void expect_lanes_equal_doubles() {
       const double got[] = {a.f.x[l],
                             a.f.y[l],
                             a.f.z[l],
-                            a.n_x_f.x[l],
-                            a.n_x_f.y[l],
-                            a.n_x_f.z[l],
+                            a.f_x_n.x[l],
+                            a.f_x_n.y[l],
+                            a.f_x_n.z[l],
                             a.slip[l],
                             spring.delta_t.x[l],
                             spring.delta_t.y[l],
                             spring.delta_t.z[l],
                             spring.slipping[l]};
-      const double expected[] = {b.f.x,  b.f.y,       b.f.z,       b.n_x_f.x,   b.n_x_f.y, b.n_x_f.z,
+      const double expected[] = {b.f.x,  b.f.y,       b.f.z,       b.f_x_n.x,   b.f_x_n.y, b.f_x_n.z,
                                  b.slip, s.delta_t.x, s.delta_t.y, s.delta_t.z, s.slipping};
       for (int c = 0; c < 11; ++c) ASSERT_EQ(std::memcmp(&got[c], &expected[c], 8), 0) << "component " << c;
     }

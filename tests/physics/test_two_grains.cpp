@@ -134,9 +134,9 @@ TEST(RotatedPair, ForcesTurnWithIt) {
       EXPECT_EQ(slip[l], 0);
       EXPECT_NEAR(length(f_t), k * spring, 1e-10 * scale) << "axis " << l;
       EXPECT_LT(length(f_t - expected(-k * first)), 1e-10 * scale) << "axis " << l;
-      EXPECT_LT(length(lane(a.n_x_f, l) - expected(cross(n, -k * first))), 1e-10 * scale) << "axis " << l;
+      EXPECT_LT(length(lane(a.f_x_n, l) - expected(cross(-k * first, n))), 1e-10 * scale) << "axis " << l;
       // What the forces do to the pair, the torques undo.
-      EXPECT_LT(length(cross(distance * n_end, f) - distance * lane(a.n_x_f, l)),
+      EXPECT_LT(length(cross(distance * n_end, f) + distance * lane(a.f_x_n, l)),
                 1e-14 * distance * length(f));
     }
   }
