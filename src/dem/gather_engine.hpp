@@ -175,8 +175,10 @@ struct Forces {
       if constexpr (F.viscous && F.ledger) share(action.f_viscous, action.f_x_n_viscous, 0, damping);
     }
     w.wall_push[i] = w.wall_damping[i] = 0;
-    if (w.scene.floor) add_wall(i, WallName::floor, sum, damping);
-    if (w.scene.top_wall.drive != TopWall::Drive::none) add_wall(i, WallName::top, sum, damping);
+    if (meets_walls(w.scene, w.role[i])) {
+      if (w.scene.floor) add_wall(i, WallName::floor, sum, damping);
+      if (w.scene.top_wall.drive != TopWall::Drive::none) add_wall(i, WallName::top, sum, damping);
+    }
     w.load[i] = sum;
     if constexpr (F.viscous && F.ledger) w.damping[i] = damping;
   }
@@ -311,7 +313,9 @@ class GatherEngine final : public Engine {
         if (const Index j = neighbour[k]; j > i)
           append_contact(s, view_.scene, view_.sides, grains[i], grains[j], i, j, spring[k]);
       for (const WallName wall : {WallName::floor, WallName::top})
-        if (wall == WallName::floor ? view_.scene.floor : view_.scene.top_wall.drive != TopWall::Drive::none)
+        if (!meets_walls(view_.scene, role_host_[i]))
+          continue;
+        else if (wall == WallName::floor ? view_.scene.floor : view_.scene.top_wall.drive != TopWall::Drive::none)
           append_wall_contact(s, view_.scene, control.drive, grains[i], i, wall,
                               wall_spring[2 * static_cast<std::size_t>(i) + static_cast<int>(wall)]);
     }

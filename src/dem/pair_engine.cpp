@@ -311,6 +311,7 @@ void PairEngine::rebuild_near(Chunk& chunk, const Drive& drive, double near_marg
     walls.push_back(known != chunk.walls.end() ? *known : WallPair{i, wall, {{0, 0, 0}, 0}});
   };
   for (Index i = chunk.begin; i < chunk.end; ++i) {
+    if (!meets_walls(scene_, role_.data()[i])) continue;
     if (scene_.floor && grain[i].x.z - grain[i].r < near_margin) add(i, WallName::floor);
     if (scene_.top_wall.drive != TopWall::Drive::none &&
         drive.wall_z - grain[i].x.z - grain[i].r < near_margin)
@@ -321,14 +322,40 @@ void PairEngine::rebuild_near(Chunk& chunk, const Drive& drive, double near_marg
 
 template <Features F>
 void PairEngine::pair_forces(Chunk& chunk, double dt) {
-  pair_forces<F>(chunk.near[0], dt);
-  pair_forces<F>(chunk.near[1], dt);
+  pair_forces<F, false>(chunk.near[0], dt);
+  pair_forces<F, true>(chunk.near[1], dt);
+}
+
+// Turns what a group's pairs do to their grains back into rows and adds them up, or leaves j's share in its slot.
+template <Features F, bool to_slots>
+inline void PairEngine::scatter(const PairGroup& p, const Geometry<Pack>& at, const Vec3<Pack>& force,
+                                const Vec3<Pack>& f_x_n, const Pack& slip, LoadRow* loads) {
+  const auto load = [first = reinterpret_cast<char*>(loads)](Offset o) -> LoadRow& {
+    return *reinterpret_cast<LoadRow*>(first + o);
+  };
+  Pack f[4] = {force.x, force.y, force.z, F.ledger ? slip : Pack(0.0)};
+  transpose(f[0], f[1], f[2], f[3]);
+  [[maybe_unused]] Pack t[4];
+  if constexpr (F.friction) {
+    t[0] = f_x_n.x, t[1] = f_x_n.y, t[2] = f_x_n.z, t[3] = 0.0;
+    transpose(t[0], t[1], t[2], t[3]);
+  }
+  for (int k = 0; k < 4; ++k) {
+    LoadRow &a = load(p.i[k]), &b = load(p.target[k]);
+    set_row(a.f, row(a.f) + f[k]);
+    const Pack on_j = F.ledger ? without_last(f[k]) : f[k];
+    set_row(b.f, to_slots ? -on_j : row(b.f) - on_j);
+    if constexpr (F.friction) {
+      set_row(a.torque, fma(Pack(at.l_i[k]), t[k], row(a.torque)));
+      set_row(b.torque, to_slots ? Pack(at.l_j[k]) * t[k] : fma(Pack(at.l_j[k]), t[k], row(b.torque)));
+    }
+  }
 }
 
 // Short phases over a block of groups: gather rows and turn them into lanes, the three parts of the law, turn
 // back and add up. One group alone is a long chain of dependent operations; in phases the processor works on
 // several at once.
-template <Features F>
+template <Features F, bool to_slots>
 void PairEngine::pair_forces(PairList& list, double dt) {
   const auto grain = [first = reinterpret_cast<const char*>(grain_.data())](Offset at) -> const GrainRow& {
     return *reinterpret_cast<const GrainRow*>(first + 2 * static_cast<std::size_t>(at));
@@ -354,17 +381,11 @@ void PairEngine::pair_forces(PairList& list, double dt) {
         return before;
     }
   };
-  struct Push {
-    Vec3<Pack> f, f_x_n;
-    Pack slip;
-  };
   Lanes lanes[group_block];
   Geometry<Pack> geometry[group_block];
   Slide<Pack> slides[group_block];
   Vec3<Pack> delta_t[group_block];
   Grip<Pack> grips[group_block];
-  Push push[group_block];
-  [[maybe_unused]] Push damping[F.viscous && F.ledger ? group_block : 1];
 
   const auto groups = static_cast<std::int64_t>(list.pairs.size());
   auto across = list.across_sides.begin();
@@ -383,7 +404,9 @@ void PairEngine::pair_forces(PairList& list, double dt) {
       }
       transpose(d[0], d[1], d[2], d[3]);
       transpose(v[0], v[1], v[2], v[3]);
-      q.x_ij = {d[0], d[1], d[2]}, q.r_difference = d[3], q.r_sum = v[3];
+      Vec3<Pack> x_ij{d[0], d[1], d[2]};
+      if (across != list.across_sides.end() && *across == start + g) x_ij = nearest_image(sides, x_ij), ++across;
+      geometry[g] = between_grains(x_ij, v[3], d[3]);
       q.before.v = {v[0], v[1], v[2]};
       if constexpr (F.friction) {
         transpose(wi[0], wi[1], wi[2], wi[3]);
@@ -401,58 +424,25 @@ void PairEngine::pair_forces(PairList& list, double dt) {
         q.now = {{v[0], v[1], v[2]}, {wi[0], wi[1], wi[2]}, {wj[0], wj[1], wj[2]}};
       }
     }
-    for (; across != list.across_sides.end() && *across < start + block; ++across)
-      lanes[*across - start].x_ij = nearest_image(sides, lanes[*across - start].x_ij);
-
-    for (int g = 0; g < block; ++g)
-      geometry[g] = between_grains(lanes[g].x_ij, lanes[g].r_sum, lanes[g].r_difference);
-    if constexpr (F.friction) {
+    if constexpr (F.friction)
       for (int g = 0; g < block; ++g) slides[g] = slide(dt, geometry[g], lanes[g].before);
-      for (int g = 0; g < block; ++g) {
-        const PairGroup& later = list.pairs[std::min(start + g + group_block, groups - 1)];
-        for (const Offset j : later.j) __builtin_prefetch(&grain(j).x), __builtin_prefetch(&grain(j).omega);
-        delta_t[g] = carry(dt, geometry[g], slides[g], list.springs[start + g]);
-      }
+    for (int g = 0; g < block; ++g) {
+      const PairGroup& later = list.pairs[std::min(start + g + group_block, groups - 1)];
+      for (const Offset j : later.j) __builtin_prefetch(&grain(j).x), __builtin_prefetch(&grain(j).omega);
+      if constexpr (F.friction) delta_t[g] = carry(dt, geometry[g], slides[g], list.springs[start + g]);
     }
     for (int g = 0; g < block; ++g)
       grips[g] = grip<F>(law, geometry[g], lanes[g].at_step(), delta_t[g], list.slipping[start + g]);
     for (int g = 0; g < block; ++g) {
+      const Geometry<Pack>& at = geometry[g];
       Spring<Pack> spring{list.springs[start + g], 0.0};
-      const Action<Pack> a =
-          act<F>(law, geometry[g], lanes[g].at_step(), delta_t[g], grips[g], spring);
-      push[g] = {a.f, a.f_x_n, a.slip};
-      if constexpr (F.viscous && F.ledger) damping[g] = {a.f_viscous, a.f_x_n_viscous, 0.0};
+      const Action<Pack> a = act<F>(law, at, lanes[g].at_step(), delta_t[g], grips[g], spring);
       if constexpr (F.friction) list.springs[start + g] = spring.delta_t;
       if constexpr (F.softening) list.slipping[start + g] = spring.slipping;
+      scatter<F, to_slots>(list.pairs[start + g], at, a.f, a.f_x_n, a.slip, load_.data());
+      if constexpr (F.viscous && F.ledger)
+        scatter<F, to_slots>(list.pairs[start + g], at, a.f_viscous, a.f_x_n_viscous, 0.0, damping_.data());
     }
-
-    const auto scatter = [&](LoadRow* loads, const Push* pushes) {
-      const auto load = [first = reinterpret_cast<char*>(loads)](Offset at) -> LoadRow& {
-        return *reinterpret_cast<LoadRow*>(first + at);
-      };
-      for (int g = 0; g < block; ++g) {
-        const PairGroup& p = list.pairs[start + g];
-        const Push& q = pushes[g];
-        Pack f[4] = {q.f.x, q.f.y, q.f.z, F.ledger ? q.slip : Pack(0.0)};
-        transpose(f[0], f[1], f[2], f[3]);
-        [[maybe_unused]] Pack t[4];
-        if constexpr (F.friction) {
-          t[0] = q.f_x_n.x, t[1] = q.f_x_n.y, t[2] = q.f_x_n.z, t[3] = 0.0;
-          transpose(t[0], t[1], t[2], t[3]);
-        }
-        for (int k = 0; k < 4; ++k) {
-          LoadRow &a = load(p.i[k]), &b = load(p.target[k]);
-          set_row(a.f, row(a.f) + f[k]);
-          set_row(b.f, row(b.f) - (F.ledger ? without_last(f[k]) : f[k]));
-          if constexpr (F.friction) {
-            set_row(a.torque, fma(Pack(geometry[g].l_i[k]), t[k], row(a.torque)));
-            set_row(b.torque, fma(Pack(geometry[g].l_j[k]), t[k], row(b.torque)));
-          }
-        }
-      }
-    };
-    scatter(load_.data(), push);
-    if constexpr (F.viscous && F.ledger) scatter(damping_.data(), damping);
   }
 }
 
@@ -465,7 +455,6 @@ void PairEngine::collect(const Chunk& chunk, LoadRow* load) const {
       LoadRow& to = load[slot_owner_.data()[slot - first_slot]];
       set_row(to.f, row(to.f) + row(load[slot].f));
       set_row(to.torque, row(to.torque) + row(load[slot].torque));
-      load[slot] = {};
     }
   }
 }

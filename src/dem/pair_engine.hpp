@@ -121,8 +121,11 @@ class PairEngine final : public Engine {
   void evaluate(double dt);
   template <Features F>
   void pair_forces(Chunk& chunk, double dt);
-  template <Features F>
+  template <Features F, bool to_slots>
   void pair_forces(PairList& list, double dt);
+  template <Features F, bool to_slots>
+  static void scatter(const PairGroup& pairs, const Geometry<Pack>& geometry, const Vec3<Pack>& f,
+                      const Vec3<Pack>& f_x_n, const Pack& slip, LoadRow* loads);
   void collect(const Chunk& chunk, LoadRow* load) const;
   template <Features F>
   void finish(Chunk& chunk, const Drive& drive, double dt);
