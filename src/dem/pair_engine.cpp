@@ -95,8 +95,7 @@ void PairEngine::load(const Scene& scene, const State& s) {
   const Index chunks = chunk_count(n_);
   chunks_.clear();
   chunks_.resize(chunks);
-  pairs_done_ = std::make_unique<Progress[]>(chunks);
-  for (Index c = 0; c < chunks; ++c) pairs_done_[c].step = -1;
+  progress_ = std::make_unique<Progress[]>(chunks);
   const std::int64_t rows = n_ + 2 * chunks;
   grain_.resize(rows), load_.resize(rows), mobility_.resize(n_), role_.resize(n_);
   const Features features = features_of(scene);
@@ -253,7 +252,7 @@ double PairEngine::sum_slip(std::int64_t step) const {
 // Whether all chunks that read this one's grains or send it shares have evaluated their pairs.
 bool PairEngine::others_are_done(const Chunk& chunk, std::int64_t step) const {
   return std::all_of(chunk.incoming.begin(), chunk.incoming.end(), [&](Index l) {
-    return pairs_done_[links_[l].from].step.load(std::memory_order_acquire) == step;
+    return progress_[links_[l].from].done.load(std::memory_order_acquire) == step;
   });
 }
 
@@ -619,14 +618,18 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
         finish<F>(c, drive, dt);
         if (integrated) integrate<F>(c, drive, drive.step);
       };
-      mine([&](Chunk& c) {
+      const auto take_on = [&](Chunk& c) {
+        Progress& progress = progress_[&c - chunks_.data()];
+        if (!progress.take(drive.step)) return;
         pair_forces<F>(c, dt);
-        pairs_done_[&c - chunks_.data()].step.store(drive.step, std::memory_order_release);
+        progress.done.store(drive.step, std::memory_order_release);
         if (others_are_done(c, drive.step))
           complete(c);
         else
           waiting.push_back(&c);
-      });
+      };
+      mine(take_on);
+      for (Chunk& c : chunks_) take_on(c);  // what a slower thread has not come to
       for (Chunk* c : waiting) {
         wait_until([&] { return others_are_done(*c, drive.step); });
         complete(*c);

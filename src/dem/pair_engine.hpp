@@ -94,9 +94,12 @@ class PairEngine final : public Engine {
     const Tally& at(std::int64_t step) const { return tally[step & 1]; }
     Tally& at(std::int64_t step) { return tally[step & 1]; }
   };
-  // The last step at which a chunk's pairs have been evaluated, for the chunks that wait for it.
+  // The last step at which a thread took a chunk on, and at which its pairs were done.
   struct alignas(64) Progress {
-    std::atomic<std::int64_t> step;
+    std::atomic<std::int64_t> taken{-1}, done{-1};
+    bool take(std::int64_t step) {
+      return taken.load(std::memory_order_relaxed) != step && taken.exchange(step) != step;
+    }
   };
   // Each thread's own copy of what all agree on.
   struct Course {
@@ -147,7 +150,7 @@ class PairEngine final : public Engine {
   Index chunk_size_ = 0;
   double r_max_ = 0, margin_ = 0;
   std::vector<Chunk> chunks_;
-  std::unique_ptr<Progress[]> pairs_done_;  // by chunk
+  std::unique_ptr<Progress[]> progress_;  // by chunk
   std::vector<Link> links_;
   Host::Array<Index> slot_owner_;
   Host::Array<GrainRow> grain_;   // n grains, then two dummies for each chunk
