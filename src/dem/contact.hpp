@@ -69,8 +69,8 @@ MORAINE_HD Geometry<double> at_wall(double z, double r, double wall_z, double fa
   return {{0, 0, facing}, delta_n, r + 0.5 * delta_n, 0, 0};
 }
 
-// How a contact moves in a step, with normal and lever arms as they were in the middle of it: taken at its end
-// they would make the work of the spring first order in dt.
+// How a contact moves in a step, with normal and lever arms as they were in the middle of it: taken at its
+// end they would make the work of the spring first order in dt.
 template <class T>
 struct Slide {
   Vec3<T> n_mid;
@@ -89,8 +89,8 @@ MORAINE_HD Slide<T> slide(double dt, const Geometry<T>& g, const Motion<T>& befo
 }
 
 // Where a step puts a contact's spring if it does not slip. The old spring turns with the pair: about n, then
-// from the old tangent plane into the new one. Both keep its length to fourth order in the angle, so a contact
-// that is carried round for long loses nothing.
+// from the old tangent plane into the new one. Both keep its length to fourth order in the angle, so a
+// contact that is carried round for long loses nothing.
 template <class T>
 MORAINE_HD Vec3<T> carry(double dt, const Geometry<T>& g, const Slide<T>& s, const Vec3<T>& old) {
   const Vec3<T> mean = axpy(T(0.5 * dt), s.v_c, old);

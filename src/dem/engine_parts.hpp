@@ -21,7 +21,9 @@ std::vector<GrainRow> grain_rows(const Scene& scene, const State& state);
 Drive drive_of(const Scene& scene, const State& state);
 
 // A grain that is held in all directions is not tested against the walls, nor against its like (Neighbours).
-MORAINE_HD bool meets_walls(const Scene& scene, Role role) { return role == Role::free || !scene.shear.hold_z; }
+MORAINE_HD bool meets_walls(const Scene& scene, Role role) {
+  return role == Role::free || !scene.shear.hold_z;
+}
 
 // A wall's action on a grain.
 struct WallAction {

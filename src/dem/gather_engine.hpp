@@ -315,7 +315,8 @@ class GatherEngine final : public Engine {
       for (const WallName wall : {WallName::floor, WallName::top})
         if (!meets_walls(view_.scene, role_host_[i]))
           continue;
-        else if (wall == WallName::floor ? view_.scene.floor : view_.scene.top_wall.drive != TopWall::Drive::none)
+        else if (wall == WallName::floor ? view_.scene.floor
+                                         : view_.scene.top_wall.drive != TopWall::Drive::none)
           append_wall_contact(s, view_.scene, control.drive, grains[i], i, wall,
                               wall_spring[2 * static_cast<std::size_t>(i) + static_cast<int>(wall)]);
     }

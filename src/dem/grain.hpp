@@ -1,5 +1,5 @@
-// Memory layout of what the contact loop reads and writes for each grain, in SIMD rows: two cache lines that it
-// reads and one that it adds to. They are kept apart so that threads never write into what others read.
+// Memory layout of what the contact loop reads and writes for each grain, in SIMD rows: two cache lines that
+// it reads and one that it adds to. They are kept apart so that threads never write into what others read.
 #pragma once
 #include <algorithm>
 

@@ -325,7 +325,8 @@ void PairEngine::pair_forces(Chunk& chunk, double dt) {
   pair_forces<F, true>(chunk.near[1], dt);
 }
 
-// Turns what a group's pairs do to their grains back into rows and adds them up, or leaves j's share in its slot.
+// Turns what a group's pairs do to their grains back into rows and adds them up, or leaves j's share in its
+// slot.
 template <Features F, bool to_slots>
 inline void PairEngine::scatter(const PairGroup& p, const Geometry<Pack>& at, const Vec3<Pack>& force,
                                 const Vec3<Pack>& f_x_n, const Pack& slip, LoadRow* loads) {
@@ -359,8 +360,8 @@ void PairEngine::pair_forces(PairList& list, double dt) {
   const auto grain = [first = reinterpret_cast<const char*>(grain_.data())](Offset at) -> const GrainRow& {
     return *reinterpret_cast<const GrainRow*>(first + 2 * static_cast<std::size_t>(at));
   };
-  [[maybe_unused]] const auto now = [first = reinterpret_cast<const char*>(now_.data())](
-                                        Offset at) -> const NowRow& {
+  [[maybe_unused]] const auto now =
+      [first = reinterpret_cast<const char*>(now_.data())](Offset at) -> const NowRow& {
     return *reinterpret_cast<const NowRow*>(first + at);
   };
   const ContactParameters law = scene_.grain;
@@ -404,7 +405,8 @@ void PairEngine::pair_forces(PairList& list, double dt) {
       transpose(d[0], d[1], d[2], d[3]);
       transpose(v[0], v[1], v[2], v[3]);
       Vec3<Pack> x_ij{d[0], d[1], d[2]};
-      if (across != list.across_sides.end() && *across == start + g) x_ij = nearest_image(sides, x_ij), ++across;
+      if (across != list.across_sides.end() && *across == start + g)
+        x_ij = nearest_image(sides, x_ij), ++across;
       geometry[g] = between_grains(x_ij, v[3], d[3]);
       q.before.v = {v[0], v[1], v[2]};
       if constexpr (F.friction) {
@@ -564,7 +566,7 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
   run_team(space_.threads, [&](int thread) {
     Course course = start;
     Drive& drive = course.drive;
-    bool closed = start_closed, forces_next = start_at_forces, integrated = false;
+    bool closed = start_closed, forces_next = start_at_forces, integrated = false, rebuild = false;
     std::int64_t left = wanted;
     Pause reason = Pause::done;
     std::vector<Chunk*> waiting;
@@ -608,7 +610,7 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
         if (!(course.moved_near < course.near_margin)) {
           course.near_margin = choose_near_margin(speed, course.moved);
           course.moved_near = 0;
-          mine([&](Chunk& c) { rebuild_near(c, drive, course.near_margin); });
+          rebuild = true;
         }
       }
       forces_next = false;
@@ -621,6 +623,7 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
       const auto take_on = [&](Chunk& c) {
         Progress& progress = progress_[&c - chunks_.data()];
         if (!progress.take(drive.step)) return;
+        if (rebuild) rebuild_near(c, drive, course.near_margin);
         pair_forces<F>(c, dt);
         progress.done.store(drive.step, std::memory_order_release);
         if (others_are_done(c, drive.step))
@@ -635,6 +638,7 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
         complete(*c);
       }
       waiting.clear();
+      rebuild = false;
     }
     if (thread == 0) course_ = course, closed_ = closed, steps = left, pause = reason;
   });

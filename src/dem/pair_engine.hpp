@@ -6,9 +6,9 @@
 // leaves j's share in a slot that j's chunk collects, so that no two threads write to one place and every sum
 // has one order (grain.hpp, SumOrder).
 //
-// So only earlier chunks read a chunk's grains or send it shares. Once their pairs are done, it is finished and
-// its grains move on to the next step at once, while they are still in the cache: one pass over memory and one
-// barrier a step.
+// So only earlier chunks read a chunk's grains or send it shares. Once their pairs are done, it is finished
+// and its grains move on to the next step at once, while they are still in the cache: one pass over memory
+// and one barrier a step.
 #pragma once
 #include <array>
 #include <atomic>
@@ -83,8 +83,8 @@ class PairEngine final : public Engine {
     std::vector<Index> incoming;  // links, by the chunk they come from
     std::vector<Index> outgoing;
     std::vector<Index> top_layer;
-    // What all threads read after a step. Two, for even and odd steps: a thread may be at the next step already
-    // while another still reads.
+    // What all threads read after a step. Two, for even and odd steps: a thread may be at the next step
+    // already while another still reads.
     struct Tally {
       Reaction reaction;
       double slip = 0;                 // J, dissipated in the step
