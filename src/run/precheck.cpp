@@ -48,12 +48,14 @@ void check_step(const Stage& stage, const dem::State& s, std::vector<std::string
   const std::vector<Mode> modes = modes_of(stage.scene, s, s.r[smallest]);
   for (const Mode& m : modes)
     if (const double own = 2 / std::sqrt(m.k * m.w); own < limit) limit = own, what = m.what;
-  if (dt > limit)
+  if (dt > limit) {
     warnings.push_back(text(about, "the step of ", dt, " s is above the two-body limit of ", limit, " s ",
                             what, of, ": the run will be unstable; expected a smaller model.f or model.dt"));
+    return;
+  }
   for (const Mode& m : modes) {
-    const double damping = m.gamma * m.w * dt, room = std::max(0.0, 1 - 0.25 * m.k * m.w * dt * dt);
-    if (room == 0 || damping < 0.3 * room) continue;  // without room the warning above says it
+    const double damping = m.gamma * m.w * dt, room = 1 - 0.25 * m.k * m.w * dt * dt;
+    if (damping <= 0.3 * room) continue;
     const std::string found = text(about, m.damping, " = ", m.gamma, " N s/m with a step of ", dt, " s: ");
     if (damping >= room)
       throw error(found, "damping ", m.what, of, " is unstable; expected below ", room / (m.w * dt),
