@@ -42,8 +42,8 @@ std::vector<Mode> modes_of(const Stage& stage, const dem::State& s, double r) {
     const double layer = std::round(
         std::clamp(scene.area() / (stage.diameter * stage.diameter), 1.0, static_cast<double>(s.size())));
     const double mass = scene.top_wall.mass;
-    modes.push_back({text("of the top wall (", mass, " kg) with ", layer, " grains on it"), "wall_gamma_n",
-                     scene.wall.k_n, scene.wall.gamma_n, w + layer / mass, false});
+    modes.push_back({text("of the top wall (", mass, " kg) with up to ", layer, " grains on it"),
+                     "wall_gamma_n", scene.wall.k_n, scene.wall.gamma_n, w + layer / mass, false});
   }
   return modes;
 }
