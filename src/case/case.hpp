@@ -56,6 +56,14 @@ struct Output {
   bool operator==(const Output&) const = default;
 };
 
+// Where a run that goes wrong is stopped (src/run/guard.hpp).
+struct Guards {
+  std::int64_t interval;  // steps
+  double max_overlap;     // of the smaller radius
+  double max_residue;     // of the energy stored and put in
+  bool operator==(const Guards&) const = default;
+};
+
 struct Case {
   std::filesystem::path directory;
   std::string title;
@@ -74,6 +82,7 @@ struct Case {
   bool ledger;
   std::vector<Stage> stages;
   Output output;
+  Guards guards;
 
   std::string resolved;  // the merged case.toml, SI numbers, ready to be written and read again
   bool operator==(const Case&) const = default;

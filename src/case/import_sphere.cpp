@@ -173,7 +173,15 @@ std::string case_text(const Bed& bed, const std::string& file) {
   line("gravity", bed.scene.gravity);
   text << "\n[[stage]]\nname = \"consolidate\"\nkind = \"consolidate\"\nnormal_stress = \"10 kPa\"\nduration "
           "= \"0.1 s\"\n";
-  line("wall_gamma_n", bed.scene.wall.gamma_n), line("wall_gamma_t", bed.scene.wall.gamma_t);
+  // Damping beyond the critical one makes explicit steps chatter: the run would be refused.
+  const double r_min = *std::min_element(bed.state.r.begin(), bed.state.r.end());
+  const double critical = 2 * std::sqrt(k_n * dem::sphere_mass(bed.scene.density, r_min));
+  const auto damping = [&](const char* key, double of_file) {
+    line(key, std::min(of_file, critical));
+    if (of_file > critical)
+      text << "# the file has " << of_file << ", above critical damping of its smallest grain\n";
+  };
+  damping("wall_gamma_n", bed.scene.wall.gamma_n), damping("wall_gamma_t", bed.scene.wall.gamma_t);
   line("wall_mu", bed.scene.wall.mu_d);
   text << "\n[[stage]]\nname = \"shear\"\nkind = \"shear\"\nnormal_stress = \"10 kPa\"\nstrain_rate = \"0.05 "
           "1/s\"\n"

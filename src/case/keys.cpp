@@ -71,6 +71,7 @@ std::vector<Key> make_keys() {
   using O = Output;
   constexpr auto grains = &C::grains;
   constexpr auto output = &C::output;
+  constexpr auto guards = &C::guards;
   const string sheared = "shear, shear_stress", damped = "; settle, consolidate: ";
   return {
       // clang-format off
@@ -142,6 +143,10 @@ std::vector<Key> make_keys() {
       row<output, &O::series_interval>("output.series_interval", "s", "0.05", "> 0", "of model time"),
       row<output, &O::snapshot_interval>("output.snapshot_interval", "s", "0.5", "> 0", "of model time"),
       row<output, &O::checkpoint_interval>("output.checkpoint_interval", "s", "60", "> 0", "of wall clock"),
+
+      row<guards, &Guards::interval>("guards.interval", "", "20000", ">= 1", "steps between looks at the state; the engine itself looks for lost grains every 256"),
+      row<guards, &Guards::max_overlap>("guards.max_overlap", "1", "0.2", "> 0", "deepest overlap over the smaller radius; beyond it the run stops"),
+      row<guards, &Guards::max_residue>("guards.max_residue", "1", "0.1", "> 0", "energy created or lost over that stored and put in; beyond it the run stops"),
       // clang-format on
   };
 }

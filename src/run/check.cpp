@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <iostream>
 
+#include "run/precheck.hpp"
 #include "run/progress.hpp"
 #include "run/run.hpp"
 #include "run/stages.hpp"
@@ -33,6 +34,7 @@ void check_case(const Options& options) {
   const cases::Case c = cases::load(options.directory, options.overrides);
   const Start start = start_of(c);
   const auto engine = dem::make_engine(options.backend, options.threads);
+  const std::vector<std::string> warnings = precheck(c, start, *engine);
   dem::State state = start.state;
   const double n = state.size(), diameter = mean_diameter(state);
   double volume = 0;
@@ -82,6 +84,7 @@ void check_case(const Options& options) {
     std::printf("    time        about %s at %.3g ms a step\n", readable_time(steps * ms / 1e3).c_str(), ms);
   }
   std::printf("  all           about %s, timed on the first stage's grains\n", readable_time(total).c_str());
+  for (const std::string& w : warnings) std::printf("  warning: %s\n", w.c_str());
 }
 
 }  // namespace moraine::run

@@ -8,6 +8,8 @@
 
 #include "error.hpp"
 #include "output/files.hpp"
+#include "run/guard.hpp"
+#include "run/precheck.hpp"
 #include "run/progress.hpp"
 #include "run/record.hpp"
 #include "run/stages.hpp"
@@ -46,6 +48,7 @@ class Runner {
   void run() {
     start_ = start_of(case_);  // with the engine, before anything of an earlier run is touched
     engine_ = dem::make_engine(options_.backend, options_.threads);
+    warnings_ = precheck(case_, start_, *engine_);
     const bool resuming = settle_old_output();
     if (resuming && now_.finished) {
       std::cerr << files_.checkpoint().string() << ": the case has finished already\n";
@@ -102,6 +105,7 @@ class Runner {
     output::write_text(files_.resolved(), header + case_.resolved);
     progress_->say((resuming ? "resumed: " : "") + case_.title + ": " + std::to_string(start_.state.size()) +
                    " grains, " + engine_->describe());
+    for (const std::string& w : warnings_) progress_->say("warning: " + w);
     series_ = std::make_unique<output::Series>(files_.series(), now_.rows);
 
     for (auto k = static_cast<std::size_t>(now_.stage); k < case_.stages.size(); ++k)
@@ -140,11 +144,12 @@ class Runner {
     std::int64_t step = now_.state.step;
     progress_->begin(stage.name, step, stage.steps, 0);
 
+    Guard guard(case_.guards, stage, now_.rows);
     std::int64_t slice = 64;  // steps between looks at the clock
     while (step < stage.steps) {
       const auto next = [&](std::int64_t every) { return (step / every + 1) * every; };
       const std::int64_t event =
-          std::min<std::int64_t>({next(stage.series_every), next(stage.snapshot_every), stage.steps});
+          std::min({next(stage.series_every), next(stage.snapshot_every), next(guard.every()), stage.steps});
       const std::int64_t until = std::min(event, step + slice);
       const auto began = std::chrono::steady_clock::now();
       engine_->advance(until - step);
@@ -153,13 +158,14 @@ class Runner {
       step = until;
       if (step == event) {
         now_.state = engine_->state();
+        guard.check(now_.state);
         if (step % stage.series_every == 0 || step == stage.steps) record(stage);
         if (step % stage.snapshot_every == 0 || step == stage.steps) snapshot(stage);
       }
       progress_->show({step, static_cast<double>(step) * stage.scene.dt, now_.rows.back().unbalanced_force});
       const bool stop = stop_requested;
       if (stop || step == stage.steps || seconds_since_save() > case_.output.checkpoint_interval) {
-        if (step != event) now_.state = engine_->state();
+        if (step != event) guard.check(now_.state = engine_->state());
         save();
       }
       if (stop)
@@ -198,6 +204,7 @@ class Runner {
   output::Checkpoint now_;
   std::unique_ptr<dem::Engine> engine_;
   std::unique_ptr<Progress> progress_;
+  std::vector<std::string> warnings_;
   std::unique_ptr<output::Series> series_;
   std::chrono::steady_clock::time_point saved_ = std::chrono::steady_clock::now();
 };

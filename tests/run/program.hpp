@@ -142,6 +142,16 @@ checkpoint_interval = "0.02 s"
     for (const std::string& o : overrides) words.insert(words.end(), {"--set", o});
     return words;
   }
+  // Fails with one line on standard error that holds all these words.
+  void expect_error(const std::vector<std::string>& command, const std::vector<std::string>& words) const {
+    const Outcome o = moraine(command);
+    EXPECT_EQ(o.status, 1) << o.err;
+    EXPECT_EQ(o.out, "");
+    EXPECT_EQ(std::count(o.err.begin(), o.err.end(), '\n'), 1) << o.err;
+    EXPECT_TRUE(o.err.starts_with("moraine: ")) << o.err;
+    for (const std::string& word : words)
+      EXPECT_NE(o.err.find(word), std::string::npos) << "no \"" << word << "\" in: " << o.err;
+  }
   void run(const fs::path& which, const std::vector<std::string>& overrides = {},
            const std::vector<std::string>& more = {}) const {
     std::vector<std::string> words = to_run(which, overrides);

@@ -9,16 +9,6 @@ namespace {
 
 class Errors : public Program {
  protected:
-  // Fails with one line on standard error that holds all these words.
-  void expect_error(const std::vector<std::string>& command, const std::vector<std::string>& words) const {
-    const Outcome o = moraine(command);
-    EXPECT_EQ(o.status, 1) << o.err;
-    EXPECT_EQ(o.out, "");
-    EXPECT_EQ(std::count(o.err.begin(), o.err.end(), '\n'), 1) << o.err;
-    EXPECT_TRUE(o.err.starts_with("moraine: ")) << o.err;
-    for (const std::string& word : words)
-      EXPECT_NE(o.err.find(word), std::string::npos) << "no \"" << word << "\" in: " << o.err;
-  }
   void expect_error_in(const std::string& old, const std::string& now,
                        const std::vector<std::string>& words) const {
     std::string text = small_case();

@@ -1,0 +1,138 @@
+#include "run/guard.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dem/contact.hpp"
+#include "dem/grain.hpp"
+#include "error.hpp"
+
+namespace moraine::run {
+
+namespace {
+
+bool finite(const dem::Vec3d& a) { return std::isfinite(a.x + a.y + a.z); }
+
+std::string triple(const dem::Vec3d& a) {
+  std::ostringstream text;
+  text.precision(9);
+  text << "(" << a.x << ", " << a.y << ", " << a.z << ")";
+  return text.str();
+}
+
+std::string when(const Stage& stage, const dem::State& s) {
+  std::ostringstream text;
+  text << " at step " << s.step << " (t = " << static_cast<double>(s.step) * stage.scene.dt << " s) of stage "
+       << stage.name;
+  return text.str();
+}
+
+std::string grain_there(const Stage& stage, const dem::State& s, dem::Index i) {
+  std::ostringstream text;
+  text << "grain " << s.id[i] << when(stage, s) << ", position " << triple(s.x[i]) << " m, velocity "
+       << triple(s.v[i]) << " m/s: ";
+  return text.str();
+}
+
+void check_numbers(const Stage& stage, const dem::State& s) {
+  for (dem::Index i = 0; i < s.size(); ++i)
+    if (!finite(s.x[i]) || !finite(s.v[i]) || !finite(s.omega[i]) || !finite(s.force[i]) ||
+        !finite(s.torque[i]) || !finite(s.rotation[i]))
+      throw error(grain_there(stage, s, i), "force or motion is not a finite number; try a smaller model.f");
+  if (!std::isfinite(s.wall_z + s.wall_v + s.wall_force + s.shear_force + s.layer_u))
+    throw error("top wall or driven layer", when(stage, s), ": height ", s.wall_z, " m, velocity ", s.wall_v,
+                " m/s, layer velocity ", s.layer_u,
+                " m/s: not all finite numbers; try a smaller model.f or a heavier wall.mass");
+  if (stage.scene.top_wall.drive != dem::TopWall::Drive::none && stage.scene.floor && s.wall_z <= 0)
+    throw error("top wall", when(stage, s), ": it fell through the floor, to ", s.wall_z,
+                " m; no grains held it: check the start, wall.mass and normal_stress");
+}
+
+double stored(const output::Row& r) {
+  return r.kinetic + r.rotational + r.elastic_normal + r.elastic_tangential + r.wall_kinetic;
+}
+
+dem::Index most_energetic(const dem::Scene& scene, const dem::State& s) {
+  dem::Index most = 0;
+  double most_energy = -1;
+  for (dem::Index i = 0; i < s.size(); ++i) {
+    const double m = dem::sphere_mass(scene.density, s.r[i]);
+    const double e = 0.5 * m * (dot(s.v[i], s.v[i]) + 0.4 * s.r[i] * s.r[i] * dot(s.omega[i], s.omega[i]));
+    if (e > most_energy) most = i, most_energy = e;
+  }
+  return most;
+}
+
+}  // namespace
+
+Overlap deepest_overlap(const dem::Scene& scene, const dem::State& s) {
+  Overlap deepest;
+  const auto take = [&](const Overlap& o) {
+    if (o.fraction > deepest.fraction) deepest = o;
+  };
+  const dem::Sides sides = dem::Sides::of(scene);
+  for (const dem::Contact& c : s.contacts) {
+    const dem::Vec3d x_ij = dem::nearest_image(sides, s.x[c.i] - s.x[c.j]);
+    const double depth = s.r[c.i] + s.r[c.j] - std::sqrt(dot(x_ij, x_ij));
+    take({depth / std::min(s.r[c.i], s.r[c.j]), depth, c.i, c.j, {}});
+  }
+  for (const dem::WallContact& w : s.wall_contacts) {
+    const bool top = w.wall == dem::WallName::top;
+    const double depth = -dem::at_wall(s.x[w.i].z, s.r[w.i], top ? s.wall_z : 0.0, top ? -1.0 : 1.0).delta_n;
+    take({depth / s.r[w.i], depth, w.i, -1, w.wall});
+  }
+  return deepest;
+}
+
+std::string describe(const Overlap& o, const dem::State& s) {
+  std::ostringstream text;
+  text << "overlaps ";
+  if (o.j >= 0)
+    text << "grain " << s.id[o.j] << " at " << triple(s.x[o.j]) << " m";
+  else
+    text << (o.wall == dem::WallName::top ? "the top wall" : "the floor");
+  text << " by " << o.depth << " m, " << o.fraction << " of the smaller radius";
+  return text.str();
+}
+
+Guard::Guard(const cases::Guards& limits, const Stage& stage, const std::vector<output::Row>& rows)
+    : limits_(limits), stage_(stage) {
+  const auto own = std::find_if(rows.begin(), rows.end(),
+                                [&](const output::Row& r) { return r.stage == rows.back().stage; });
+  first_ = *own;
+  for (auto r = own; r != rows.end(); ++r) most_put_in_ = std::max(most_put_in_, energy_put_in({first_, *r}));
+}
+
+void Guard::check(const dem::State& s) {
+  check_numbers(stage_, s);
+  if (const Overlap o = deepest_overlap(stage_.scene, s); o.fraction > limits_.max_overlap)
+    throw error(
+        grain_there(stage_, s, o.i), describe(o, s),
+        "; expected at most guards.max_overlap = ", limits_.max_overlap,
+        ": the load or the impact is too much for contact.k_n, or the step is too long (try a smaller "
+        "model.f)");
+  check_energy(s);
+}
+
+void Guard::check_energy(const dem::State& s) {
+  const double energy_0 = stored(first_) + first_.potential;
+  const output::Row now = row_of(static_cast<std::size_t>(first_.stage), stage_, s, 0, energy_0);
+  most_put_in_ = std::max(most_put_in_, energy_put_in({first_, now}));
+  // Rounding of the potential energy may exceed what a bed at rest has stored.
+  const double had = stored(first_) + most_put_in_ + 1e-10 * std::abs(first_.potential);
+  const double gained = stored(now) + now.potential - energy_0 - now.top_wall_work - now.layers_work;
+  const bool ledger = stage_.scene.ledger;
+  // Damping that pushes is creation of energy too, though the ledger balances.
+  const double negative = ledger ? std::max(0.0, -now.viscous) + std::max(0.0, -now.slip) : 0;
+  const double created = (ledger ? now.residue : gained) + negative;
+  const bool too_much = !(created <= limits_.max_residue * had);
+  const bool too_little = ledger && !(-created <= limits_.max_residue * had);
+  if (!too_much && !too_little) return;
+  throw error(grain_there(stage_, s, most_energetic(stage_.scene, s)), "moves with the most energy after ",
+              std::abs(created), " J were ", too_much ? "created" : "lost", ", ", std::abs(created) / had,
+              " of the ", had,
+              " J stored and put in; expected at most guards.max_residue = ", limits_.max_residue,
+              ": the step is too long for the stiffness or the damping (try a smaller model.f)");
+}
+
+}  // namespace moraine::run

@@ -1,0 +1,48 @@
+// Stops a run that goes wrong, with one error that names cause, grain, step, place and remedy. It reads
+// states at fixed steps and writes nothing, so the bits of a healthy run are those of a run without it.
+//
+//   numbers    forces, torques, wall and layer are finite (the engine itself watches x, v and omega), and the
+//              top wall is above the floor
+//   overlap    of two grains, or of a grain and a wall, over the radius of the smaller: <=
+//   guards.max_overlap.
+//              Linear springs are meant for hardly deformed spheres; at 0.2 each of two equal grains has lost
+//              0.7 % of its volume in the contact
+//   energy     |residue| <= guards.max_residue times (energy stored when the stage began + the most that
+//   wall,
+//              layers and falling grains had put in so far). What sliding and damping have "dissipated" must
+//              not be negative either. Without a ledger dissipation is unknown; then only more energy than
+//              was stored and put in is an error
+#pragma once
+#include <vector>
+
+#include "run/record.hpp"
+
+namespace moraine::run {
+
+class Guard {
+ public:
+  // `rows`: the series so far, with at least the first row of this stage.
+  Guard(const cases::Guards& limits, const Stage& stage, const std::vector<output::Row>& rows);
+
+  std::int64_t every() const { return limits_.interval; }  // steps
+  void check(const dem::State& state);                     // throws Error
+
+ private:
+  void check_energy(const dem::State& state);
+
+  cases::Guards limits_;
+  Stage stage_;
+  output::Row first_;       // of the stage
+  double most_put_in_ = 0;  // J
+};
+
+// The deepest overlap of a state's contacts, as a fraction of the smaller radius.
+struct Overlap {
+  double fraction = 0, depth = 0;  // 1, m
+  dem::Index i = -1, j = -1;       // memory order; j = -1: a wall
+  dem::WallName wall = dem::WallName::floor;
+};
+Overlap deepest_overlap(const dem::Scene& scene, const dem::State& state);
+std::string describe(const Overlap& overlap, const dem::State& state);
+
+}  // namespace moraine::run

@@ -1,0 +1,117 @@
+#include "run/precheck.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "error.hpp"
+#include "run/guard.hpp"
+
+namespace moraine::run {
+
+namespace {
+
+template <class... Parts>
+std::string text(const Parts&... parts) {
+  return error(parts...).what();
+}
+
+// A way in which contacts can swing.
+struct Mode {
+  std::string what;
+  const char* damping;  // key
+  double k, gamma, w;   // N/m, N s/m, 1/kg
+  bool certain;         // that these contacts exist
+};
+
+// Of the smallest grain, radius r.
+std::vector<Mode> modes_of(const Stage& stage, const dem::State& s, double r) {
+  const dem::Scene& scene = stage.scene;
+  const double w = 1 / dem::sphere_mass(scene.density, r);
+  const auto sticks = [](const dem::ContactParameters& p, double value) { return p.mu_s > 0 ? value : 0; };
+  std::vector<Mode> modes;
+  const auto add = [&](const dem::ContactParameters& p, bool wall, double bodies) {
+    modes.push_back({wall ? "along the normal of a wall" : "along the normal of two grains",
+                     wall ? "wall_gamma_n" : "gamma_n", p.k_n, p.gamma_n, bodies * w, true});
+    modes.push_back({wall ? "along a wall" : "along the tangent of two grains",
+                     wall ? "wall_gamma_t" : "gamma_t", sticks(p, p.k_t), sticks(p, p.gamma_t),
+                     3.5 * bodies * w, true});
+  };
+  if (s.size() > 1) add(scene.grain, false, 2);
+  if (scene.floor || scene.top_wall.drive != dem::TopWall::Drive::none) add(scene.wall, true, 1);
+  if (scene.top_wall.drive == dem::TopWall::Drive::stress) {
+    const double layer = std::round(
+        std::clamp(scene.area() / (stage.diameter * stage.diameter), 1.0, static_cast<double>(s.size())));
+    const double mass = scene.top_wall.mass;
+    modes.push_back({text("of the top wall (", mass, " kg) with up to ", layer, " grains on it"),
+                     "wall_gamma_n", scene.wall.k_n, scene.wall.gamma_n, w + layer / mass, false});
+  }
+  return modes;
+}
+
+void check_step(const Stage& stage, const dem::State& s, std::vector<std::string>& warnings) {
+  const double dt = stage.scene.dt;
+  const auto smallest = static_cast<dem::Index>(std::min_element(s.r.begin(), s.r.end()) - s.r.begin());
+  const std::string about = text("stage ", stage.name, ": ");
+  const std::string of = text(" (grain ", s.id[smallest], ", the smallest)");
+  for (const Mode& m : modes_of(stage, s, s.r[smallest])) {
+    const double damping = m.gamma * m.w * dt, room = 1 - 0.25 * m.k * m.w * dt * dt;
+    const char* heavier = m.certain ? "" : ", or a heavier wall.mass";
+    if (room <= 0) {
+      warnings.push_back(text(about, "the step of ", dt, " s is above the limit of ",
+                              2 / std::sqrt(m.k * m.w), " s for motion ", m.what, of,
+                              " and unstable; expected a smaller model.f or model.dt", heavier));
+      continue;
+    }
+    // Grains with many contacts bear less than one contact; a layer on the wall is the most there can be.
+    const double best = m.certain ? 0.3 * room : room;
+    if (damping <= best) continue;
+    const std::string found = text(about, m.damping, " = ", m.gamma, " N s/m with a step of ", dt,
+                                   " s: damping ", m.what, of, " is ");
+    const std::string remedy =
+        text("; expected at most ", best / (m.w * dt), " N s/m, or a smaller model.f", heavier);
+    if (damping >= room && m.certain) throw error(found, "unstable", remedy);
+    warnings.push_back(text(found, "at ", damping / room, " of its limit of stability", remedy));
+  }
+}
+
+// A margin shorter than what moves in a step changes no force, but every step needs a search, and what the
+// springs of contacts that open still held is not booked.
+void check_margin(const Stage& stage, const dem::State& s, std::vector<std::string>& warnings) {
+  const dem::Scene& scene = stage.scene;
+  if (scene.neighbour_margin <= 0) return;
+  double speed = std::max(std::abs(scene.shear.velocity), std::abs(scene.top_wall.velocity));
+  for (const dem::Vec3d& v : s.v) speed = std::max(speed, std::sqrt(dot(v, v)));
+  const double least = 4 * speed * scene.dt;
+  if (scene.neighbour_margin <= least)
+    warnings.push_back(text("stage ", stage.name, ": model.neighbour_margin = ", scene.neighbour_margin,
+                            " m is shorter than what grains move within two steps at ", speed,
+                            " m/s: each step needs a new search; expected more than ", least,
+                            " m, or 0 for an automatic one"));
+}
+
+void check_overlaps(const cases::Case& c, const dem::Scene& scene, const dem::State& s) {
+  const Overlap o = deepest_overlap(scene, s);
+  if (o.fraction <= c.guards.max_overlap) return;
+  throw error(c.start.empty() ? c.directory.string() : c.start.string(), ": grain ", s.id[o.i], " at (",
+              s.x[o.i].x, ", ", s.x[o.i].y, ", ", s.x[o.i].z, ") m ", describe(o, s),
+              "; expected at most guards.max_overlap = ", c.guards.max_overlap,
+              ": check radii, positions and box of the start");
+}
+
+}  // namespace
+
+std::vector<std::string> precheck(const cases::Case& c, const Start& start, dem::Engine& engine) {
+  std::vector<std::string> warnings;
+  for (std::size_t k = 0; k < c.stages.size(); ++k) {
+    dem::State s = start.state;
+    const Stage stage = prepare(c, k, start, s);
+    check_step(stage, s, warnings);
+    check_margin(stage, s, warnings);
+    if (k > 0) continue;
+    engine.load(stage.scene, s);
+    check_overlaps(c, stage.scene, engine.state());
+  }
+  return warnings;
+}
+
+}  // namespace moraine::run
