@@ -3,22 +3,23 @@ _moraine() {
   local word=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} command='' words='' i d
   for ((i = 1; i < COMP_CWORD; ++i)); do
     case ${COMP_WORDS[i]} in
-      run | check | keys | bench | import-sphere | test)
+      run | sweep | check | keys | bench | import-sphere | test)
         command=${COMP_WORDS[i]}
         break
         ;;
     esac
   done
   case $command in
-    '') words="run check keys bench import-sphere test --help --version --cuda" ;;
+    '') words="run sweep check keys bench import-sphere test --help --version --cuda" ;;
     run) words="--resume --force --quiet --set --backend --threads --help" ;;
+    sweep) words="--resume --force --quiet --set --at-once --backend --threads --help" ;;
     check) words="--set --backend --threads --help" ;;
     bench) words="--steps --stage --set --backend --threads --help" ;;
     import-sphere | keys) words="--help" ;;
   esac
   case $previous in
     --backend) words="cpu cuda auto" ;;
-    --set | --threads | --steps | --stage) return ;;
+    --set | --at-once | --threads | --steps | --stage) return ;;
   esac
   COMPREPLY=()
   if [[ ! $command || $word == -* || $previous == --backend ]]; then
@@ -26,7 +27,7 @@ _moraine() {
   elif [[ $command == import-sphere ]]; then
     compopt -o filenames +o nospace
     mapfile -t COMPREPLY < <(compgen -f -- "$word")
-  elif [[ $command == @(run|check|bench) ]]; then  # directories with a case in them, and those on the way there
+  elif [[ $command == @(run|sweep|check|bench) ]]; then  # directories with a case in them, and those on the way there
     while read -r d; do
       if [[ -e $d/case.toml ]]; then
         COMPREPLY+=("$d ")

@@ -7,6 +7,7 @@
 #include "case/import_sphere.hpp"
 #include "error.hpp"
 #include "run/run.hpp"
+#include "run/sweep.hpp"
 
 using namespace moraine;
 
@@ -45,11 +46,25 @@ int main(int argc, char** argv) {
   };
 
   // 2. The commands.
+  const auto writes_results = [&](CLI::App* command) {
+    command->add_flag("--resume", options.resume, "go on from the last checkpoint");
+    command->add_flag("--force", options.force, "replace the results of an earlier run")
+        ->excludes("--resume");
+    command->add_flag("--quiet", options.quiet, "no progress");
+  };
   CLI::App* run = app.add_subcommand("run", "run a case; results go to CASE/output");
   takes_case(run);
-  run->add_flag("--resume", options.resume, "go on from the last checkpoint");
-  run->add_flag("--force", options.force, "replace the results of an earlier run")->excludes("--resume");
-  run->add_flag("--quiet", options.quiet, "no progress");
+  writes_results(run);
+
+  CLI::App* sweep = app.add_subcommand("sweep",
+                                       "run a case with each value of a list, several at once: --set "
+                                       "normal_stress=10,20,40kPa; results go to CASE/sweep");
+  takes_case(sweep);
+  writes_results(sweep);
+  int at_once = 0;
+  sweep->add_option("--at-once", at_once, "cases at once; 0: one for each CPU thread, or all on a GPU")
+      ->check(CLI::Range(0, 4096))
+      ->capture_default_str();
 
   CLI::App* check = app.add_subcommand("check", "check a case and print what would run");
   takes_case(check);
@@ -83,6 +98,7 @@ int main(int argc, char** argv) {
                       : backend == "cuda" ? dem::Backend::cuda
                                           : dem::Backend::automatic;
     if (*run) run::run_case(options);
+    if (*sweep) run::sweep_case(options, at_once);
     if (*check) run::check_case(options);
     if (*keys) std::cout << cases::reference();
     if (*bench) run::bench_case(options, stage, steps);

@@ -1,4 +1,9 @@
 // The GPU as a place to compute; see host.hpp for the contract of each function.
+//
+// Several engines may share one card, each on a host thread of its own. Compiled with --default-stream
+// per-thread, a launch or copy that names no stream goes to that of the calling thread and waits for no
+// other. So one thread works an engine from the first array to the last, and nothing here waits for the whole
+// card: memory comes from the card's pool, in the order of the stream, for cudaFree would.
 #pragma once
 #include <cstdint>
 #include <cub/cub.cuh>
@@ -6,10 +11,23 @@
 
 #include "error.hpp"
 
+#if !defined(__CUDA_ARCH__) && !defined(CUDA_API_PER_THREAD_DEFAULT_STREAM)
+#error "compile with --default-stream per-thread"
+#endif
+
 namespace moraine {
 
 inline void cuda_check(cudaError_t status, const char* what) {
   if (status != cudaSuccess) throw error("CUDA: ", what, ": ", cudaGetErrorString(status));
+}
+
+// The pool keeps what is given back to it; by default it would return it to the driver at every
+// synchronisation.
+inline void keep_memory_pool(int device) {
+  cudaMemPool_t pool;
+  cuda_check(cudaDeviceGetDefaultMemPool(&pool, device), "memory pool");
+  std::uint64_t kept = UINT64_MAX;
+  cuda_check(cudaMemPoolSetAttribute(pool, cudaMemPoolAttrReleaseThreshold, &kept), "memory pool");
 }
 
 template <class Body>
@@ -28,13 +46,15 @@ struct Cuda {
       swap(other);
       return *this;
     }
-    ~Array() { cudaFree(data_); }
+    ~Array() { free(); }
 
     void resize(std::int64_t n) {
       if (n > capacity_) {
-        cudaFree(data_);
-        data_ = nullptr, capacity_ = n + n / 4;
-        cuda_check(cudaMalloc(&data_, capacity_ * sizeof(T)), "memory for the grains");
+        free();
+        const std::int64_t wanted = n + n / 4;
+        cuda_check(cudaMallocAsync(reinterpret_cast<void**>(&data_), wanted * sizeof(T), cudaStreamPerThread),
+                   "memory for the grains");
+        capacity_ = wanted;
       }
       size_ = n;
     }
@@ -52,6 +72,10 @@ struct Cuda {
     }
 
    private:
+    void free() {
+      if (data_) cudaFreeAsync(data_, cudaStreamPerThread);
+      data_ = nullptr, capacity_ = 0;
+    }
     void swap(Array& other) {
       std::swap(data_, other.data_), std::swap(size_, other.size_), std::swap(capacity_, other.capacity_);
     }

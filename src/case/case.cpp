@@ -148,21 +148,21 @@ fs::path start_file(const fs::path& directory, const Entry& entry) {
   return path;
 }
 
-string resolved_text(const Draft& draft) {
+// As a case.toml in SI.
+string text_of(const Draft& draft) {
   string text, table;
   const auto add = [&](const Key& key, const Entries& entries) {
-    if (!key.set) return;
-    text += key.name.substr(key.table().size()) + " = " + to_toml(entries.at(key.name).value);
-    text += (key.unit.empty() || key.unit == "1" ? "" : "  # " + key.unit) + "\n";
-  };
-  for (const Key& key : keys()) {
-    if (is_stage_key(key)) continue;
-    if (key.table() != table) {
+    const auto entry = entries.find(key.name);
+    if (!key.set || entry == entries.end()) return;
+    if (!is_stage_key(key) && key.table() != table) {
       table = key.table();
       text += "\n[" + table.substr(0, table.size() - 1) + "]\n";
     }
-    add(key, draft.entries);
-  }
+    text += key.name.substr(key.table().size()) + " = " + to_toml(entry->second.value);
+    text += (key.unit.empty() || key.unit == "1" ? "" : "  # " + key.unit) + "\n";
+  };
+  for (const Key& key : keys())
+    if (!is_stage_key(key)) add(key, draft.entries);
   for (const StageDraft& stage : draft.stages) {
     text += "\n[[stage]]\n";
     for (const Key& key : keys())
@@ -201,8 +201,29 @@ Case load(const fs::path& directory, const std::vector<Override>& overrides) {
     }
     check_stage(s.entries, draft.entries, context);
   }
-  c.resolved = resolved_text(draft);
+  c.resolved = text_of(draft);
   return c;
+}
+
+string extension_text(const fs::path& directory, const std::vector<Override>& overrides, const string& base) {
+  Draft draft = read(directory, overrides);
+  const auto keep_overrides = [](Entries& entries) {
+    std::erase_if(entries, [](const auto& e) { return !e.second.stated.starts_with(by_set); });
+  };
+  keep_overrides(draft.entries);
+  // A path keeps its meaning in the other directory.
+  if (const auto start = draft.entries.find("start"); start != draft.entries.end())
+    if (auto& path = std::get<string>(start->second.value); !path.empty())
+      path = (fs::path(base) / path).lexically_normal().string();
+  std::vector<string> stages;
+  for (StageDraft& stage : draft.stages) {
+    stages.push_back(stage.name);
+    const Entry name = stage.entries.at("stage.name");
+    keep_overrides(stage.entries);
+    if (!stage.entries.empty()) stage.entries["stage.name"] = name;
+  }
+  std::erase_if(draft.stages, [](const StageDraft& stage) { return stage.entries.empty(); });
+  return "extends = " + to_toml(base) + "\nstages = " + to_toml(stages) + "\n" + text_of(draft);
 }
 
 }  // namespace moraine::cases

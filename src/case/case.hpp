@@ -89,12 +89,17 @@ struct Case {
 };
 
 struct Override {
-  std::string key;    // "model.f", "stage.shear.normal_stress"
+  std::string key;    // "model.f", "stage.shear.normal_stress", "normal_stress" (of each stage that gives it)
   std::string value;  // TOML, or a bare unit string: 80 kPa
 };
 
 // Throws Error naming file, line, key, value, what was expected and the nearest known key.
 Case load(const std::filesystem::path& directory, const std::vector<Override>& overrides = {});
+
+// A case.toml for another directory that is this case with these overrides; `base` leads from there back
+// here.
+std::string extension_text(const std::filesystem::path& directory, const std::vector<Override>& overrides,
+                           const std::string& base);
 
 // The reference of all keys (name, unit, default, meaning), as `moraine keys` prints it.
 std::string reference();

@@ -264,22 +264,44 @@ Draft read_file(const fs::path& directory, const fs::path& root, std::vector<fs:
   return draft;
 }
 
-void set(Draft& draft, const Override& o) {
-  const string stated = "--set " + o.key + "=" + o.value;
-  if (o.key.starts_with("stage.")) {
-    const auto dot = o.key.rfind('.');
-    const string name = dot < 6 ? o.key.substr(6) : o.key.substr(6, dot - 6),
-                 key_name = "stage." + o.key.substr(dot + 1);
+string stated_as(const Override& o) { return by_set + o.key + "=" + o.value; }
+
+// A name without its table stands for the one table that has it: "seed" for grains.seed. A key of the stages
+// is meant for each stage that gives it: "normal_stress" for that of consolidate and that of shear.
+std::vector<string> full_names(const Draft& draft, const Override& o) {
+  if (o.key.find('.') != o.key.npos || find(o.key)) return {o.key};
+  std::vector<string> found, names, stages;
+  for (const Key& key : keys())
+    if (key.name.substr(key.table().size()) == o.key) found.push_back(key.name);
+  if (found.empty()) return {o.key};
+  if (found.size() > 1) throw error(stated_as(o), ": expected the full name, one of ", join(found, ", "));
+  if (!found[0].starts_with("stage.")) return found;
+  for (const StageDraft& s : draft.stages) {
+    stages.push_back(s.name);
+    if (s.entries.contains(found[0])) names.push_back("stage." + s.name + "." + o.key);
+  }
+  if (names.empty())
+    throw error(stated_as(o), ": no stage gives this key in case.toml; expected stage.NAME.", o.key,
+                " with NAME one of ", join(stages, ", "));
+  return names;
+}
+
+void set(Draft& draft, const string& full_name, const Override& o) {
+  const string stated = stated_as(o);
+  if (full_name.starts_with("stage.")) {
+    const auto dot = full_name.rfind('.');
+    const string name = dot < 6 ? full_name.substr(6) : full_name.substr(6, dot - 6),
+                 key_name = "stage." + full_name.substr(dot + 1);
     StageDraft& target = about(stated, [&]() -> StageDraft& { return stage(draft, name); });
     const Key* key = find(key_name);
     if (!key) throw error(stated, ": unknown key; ", suggestion(key_name, "stage." + name + "."));
     if (key_name == "stage.name") throw error(stated, ": a stage keeps its name");
     target.entries[key_name] = {about(stated, [&] { return parse_bare(*key, o.value); }), stated};
   } else {
-    const Key* key = find(o.key);
-    if (!key) throw error(stated, ": unknown key; ", suggestion(o.key));
+    const Key* key = find(full_name);
+    if (!key) throw error(stated, ": unknown key; ", suggestion(full_name));
     if (key->name == "extends") throw error(stated, ": only case.toml can say what it extends");
-    draft.entries[o.key] = {about(stated, [&] { return parse_bare(*key, o.value); }), stated};
+    draft.entries[full_name] = {about(stated, [&] { return parse_bare(*key, o.value); }), stated};
   }
 }
 
@@ -287,12 +309,15 @@ void set(Draft& draft, const Override& o) {
 
 Draft read(const fs::path& directory, const std::vector<Override>& overrides) {
   Draft draft = read_file(directory, directory, {});
+  const auto set_all = [&](bool of_stages) {
+    for (const Override& o : overrides)
+      for (const string& name : full_names(draft, o))
+        if (name.starts_with("stage.") == of_stages) set(draft, name, o);
+  };
   // `stages` first: a stage that does not run is none to set keys of.
-  for (const Override& o : overrides)
-    if (!o.key.starts_with("stage.")) set(draft, o);
+  set_all(false);
   select_stages(draft);
-  for (const Override& o : overrides)
-    if (o.key.starts_with("stage.")) set(draft, o);
+  set_all(true);
   return draft;
 }
 

@@ -14,6 +14,7 @@ struct Entry {
   Value value;
   std::string stated;  // for messages: "cases/x/case.toml:14: contact.mu_s = 0.3"
 };
+inline const std::string by_set = "--set ";    // how `stated` begins where an override has set the value
 using Entries = std::map<std::string, Entry>;  // by name in the table of keys
 
 struct StageDraft {

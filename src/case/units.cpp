@@ -3,6 +3,8 @@
 #include <udunits2.h>
 
 #include <charconv>
+#include <cstdlib>
+#include <filesystem>
 #include <memory>
 
 #include "error.hpp"
@@ -18,10 +20,20 @@ struct Free {
 template <class T>
 using Owned = std::unique_ptr<T, Free>;
 
+// The table of units that came along with the program; empty: that of the machine, or of UDUNITS2_XML_PATH.
+std::string table_beside_program() {
+  std::error_code none;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", none);
+  const auto table = program.parent_path().parent_path() / "share/udunits/udunits2.xml";
+  if (std::getenv("UDUNITS2_XML_PATH") || !std::filesystem::exists(table, none)) return "";
+  return table.string();
+}
+
 ut_system* unit_system() {
   static const Owned<ut_system> system = [] {
     ut_set_error_message_handler(ut_ignore);
-    return Owned<ut_system>(ut_read_xml(nullptr));
+    const std::string table = table_beside_program();
+    return Owned<ut_system>(ut_read_xml(table.empty() ? nullptr : table.c_str()));
   }();
   if (!system)
     throw error(

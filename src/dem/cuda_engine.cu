@@ -11,6 +11,7 @@ bool cuda_device_found() {
 std::unique_ptr<Engine> make_cuda_engine() {
   cudaDeviceProp card;
   cuda_check(cudaGetDeviceProperties(&card, 0), "device properties");
+  keep_memory_pool(0);
   return std::make_unique<GatherEngine<Cuda>>(Cuda{}, std::string("cuda, ") + card.name);
 }
 

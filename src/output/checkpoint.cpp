@@ -292,6 +292,7 @@ void validate(const std::string& file, const dem::State& state) {
 }  // namespace
 
 void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint) {
+  const hdf5::Lock lock;
   const auto file = hdf5::File::in_memory(path);
   file.set("program", std::string("moraine"));
   file.set("format", format);
@@ -300,6 +301,7 @@ void write_checkpoint(const std::filesystem::path& path, const Checkpoint& check
 }
 
 Checkpoint read_checkpoint(const std::filesystem::path& path) {
+  const hdf5::Lock lock;
   const auto file = hdf5::File::open(path, H5F_ACC_RDONLY);
   std::string program;
   std::int64_t found = 0;

@@ -11,14 +11,11 @@
 namespace moraine::output::hdf5 {
 namespace {
 
-// Once, before any other call: no printed error stacks, and no cleaning up at exit, which would try again to
-// write what a full disk has refused.
+// Before any other call: no printed error stacks (each thread has its own), and no cleaning up at exit, which
+// would try again to write what a full disk has refused.
 void start_library() {
-  [[maybe_unused]] static const bool started = [] {
-    H5dont_atexit();
-    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-    return true;
-  }();
+  [[maybe_unused]] static const herr_t at_exit = H5dont_atexit();
+  [[maybe_unused]] static thread_local const herr_t quiet = H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }
 
 // Why the last call failed: the system's words where it comes from the system, else HDF5's innermost message.

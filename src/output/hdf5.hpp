@@ -8,6 +8,7 @@
 #include <concepts>
 #include <cstdint>
 #include <filesystem>
+#include <mutex>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -16,6 +17,13 @@
 #include "dem/vec3.hpp"
 
 namespace moraine::output::hdf5 {
+
+// Several cases may run in one process, and the library may be built for one thread only: whoever calls it,
+// or closes a handle, holds this.
+class Lock {
+  std::lock_guard<std::recursive_mutex> held_{mutex_};
+  static inline std::recursive_mutex mutex_;
+};
 
 class Handle {
  public:

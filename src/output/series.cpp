@@ -76,6 +76,7 @@ struct Series::Impl {
 };
 
 Series::Series(const std::filesystem::path& path, const std::vector<Row>& rows) {
+  const hdf5::Lock lock;
   const std::filesystem::path aside = path.string() + ".tmp";
   std::error_code cause;
   try {
@@ -93,12 +94,17 @@ Series::Series(const std::filesystem::path& path, const std::vector<Row>& rows) 
 // After a failed append the file is left as a kill would leave it, readable: closing it would declare it
 // whole.
 Series::~Series() {
-  if (!impl_ || !impl_->failed) return;
+  const hdf5::Lock lock;
+  if (!impl_ || !impl_->failed) {
+    impl_.reset();
+    return;
+  }
   static auto& failed = *new std::vector<std::unique_ptr<Impl>>;
   failed.push_back(std::move(impl_));
 }
 
 void Series::append(const Row& row) {
+  const hdf5::Lock lock;
   auto& [file, datasets, rows, failed] = *impl_;
   const auto numbers = std::bit_cast<Numbers>(row);
   const hsize_t start = rows.size(), one = 1, grown = start + 1;
@@ -120,6 +126,7 @@ void Series::append(const Row& row) {
 const std::vector<Row>& Series::rows() const { return impl_->rows; }
 
 std::vector<Row> read_series(const std::filesystem::path& path) {
+  const hdf5::Lock lock;
   const auto file = hdf5::File::open(path, H5F_ACC_RDONLY | H5F_ACC_SWMR_READ);
   std::array<std::vector<double>, std::tuple_size_v<Numbers>> numbers;
   std::size_t rows = SIZE_MAX;

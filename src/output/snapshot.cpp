@@ -181,6 +181,7 @@ std::string xdmf(const Cloud& cloud, const std::vector<SnapshotInfo>& snapshots)
 
 SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::string& name, double time,
                             const dem::Scene& scene, const dem::State& staggered) {
+  const hdf5::Lock lock;
   SnapshotInfo info{name + ".h5", time, staggered.size(), 0};
   const auto file = hdf5::File::in_memory(directory / info.file);
   file.set("program", std::string("moraine"));

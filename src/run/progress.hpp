@@ -8,10 +8,25 @@
 
 namespace moraine::run {
 
+// Standard error.
+class Screen {
+ public:
+  explicit Screen(bool quiet);
+  ~Screen();
+  void say(const std::string& line);   // stays
+  void show(const std::string& line);  // refreshes on a terminal
+  bool due() const;                    // for the next `show`
+
+ private:
+  void clear_line();
+
+  bool quiet_, terminal_, line_shown_ = false;
+  std::chrono::steady_clock::time_point shown_ = std::chrono::steady_clock::now();
+};
+
 class Progress {
  public:
   Progress(const std::filesystem::path& log, bool append, bool quiet);
-  ~Progress();
 
   void say(const std::string& line);   // to the log and, unless quiet, to the terminal
   void log(const std::string& lines);  // to the log only
@@ -25,15 +40,14 @@ class Progress {
   void show(const Now& now);
 
  private:
-  using Clock = std::chrono::steady_clock;
-  void clear_line();
-
   std::ofstream log_;
-  bool quiet_, terminal_, line_shown_ = false;
+  Screen screen_;
   std::string stage_;
   std::int64_t first_step_ = 0, steps_ = 0, later_steps_ = 0;
-  Clock::time_point began_, shown_;
+  std::chrono::steady_clock::time_point began_;
 };
+
+double seconds_since(std::chrono::steady_clock::time_point t);
 
 // 3.2 s, 4 min 10 s, 2 h 5 min, 3 d 4 h
 std::string readable_time(double seconds);

@@ -19,6 +19,13 @@ bool shears(cases::Stage::Kind k) {
   return k == cases::Stage::Kind::shear || k == cases::Stage::Kind::shear_stress;
 }
 
+std::vector<output::Row> rows_of_stage(std::size_t stage, const std::vector<output::Row>& rows) {
+  std::vector<output::Row> own;
+  for (const output::Row& r : rows)
+    if (r.stage == static_cast<double>(stage)) own.push_back(r);
+  return own;
+}
+
 }  // namespace
 
 output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, double time_0,
@@ -70,6 +77,14 @@ Strength strength_of(const std::vector<output::Row>& rows) {
   return s;
 }
 
+std::optional<Strength> final_strength(const std::vector<cases::Stage>& stages,
+                                       const std::vector<output::Row>& rows) {
+  for (std::size_t k = stages.size(); k-- > 0;)
+    if (const auto own = rows_of_stage(k, rows); shears(stages[k].kind) && !own.empty())
+      return strength_of(own);
+  return {};
+}
+
 double energy_put_in(const std::vector<output::Row>& rows) {
   const output::Row& last = rows.back();
   return std::max(0.0, last.top_wall_work) + std::max(0.0, last.layers_work) +
@@ -84,9 +99,7 @@ std::string summary(const std::vector<cases::Stage>& stages, const std::vector<o
       "J energy in\n";
   double all_in = 0, all_residue = 0;
   for (std::size_t k = 0; k < stages.size(); ++k) {
-    std::vector<output::Row> own;
-    for (const output::Row& r : rows)
-      if (r.stage == static_cast<double>(k)) own.push_back(r);
+    const std::vector<output::Row> own = rows_of_stage(k, rows);
     if (own.empty()) continue;
     const output::Row& last = own.back();
     char text[256], strength[64] = "-         -         -         -         ";

@@ -1,5 +1,6 @@
 // From a state to a row of the series, and from the series to the table at the end.
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,9 @@ struct Strength {
   double dilation_diameters;  // at the end
 };
 Strength strength_of(const std::vector<output::Row>& stage_rows);
+// Of the last shear stage with rows; none where there is no such stage.
+std::optional<Strength> final_strength(const std::vector<cases::Stage>& stages,
+                                       const std::vector<output::Row>& rows);
 
 // J: work of wall and layers, and what the grains fell.
 double energy_put_in(const std::vector<output::Row>& stage_rows);

@@ -1,6 +1,7 @@
 #include "run/run.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -20,10 +21,12 @@ namespace fs = std::filesystem;
 
 namespace {
 
-volatile std::sig_atomic_t stop_requested = 0;
+std::atomic<bool> stop_requested = false;
+static_assert(std::atomic<bool>::is_always_lock_free);  // so a signal handler may set it
 
 struct Files {
   fs::path output;
+  bool left_by_a_run() const { return fs::exists(checkpoint()) || fs::exists(series()); }
   fs::path checkpoint() const { return output / "checkpoint.h5"; }
   fs::path series() const { return output / "series.h5"; }
   fs::path snapshots() const { return output / "snapshots"; }
@@ -40,21 +43,15 @@ void make_directories(const fs::path& path) {
 
 class Runner {
  public:
-  explicit Runner(const Options& options)
-      : options_(options),
-        case_(cases::load(options.directory, options.overrides)),
-        files_{case_.directory / "output"} {}
+  Runner(const Options& options, const cases::Case& c)
+      : options_(options), case_(c), files_{case_.directory / "output"} {}
 
-  void run() {
+  Result run() {
     start_ = start_of(case_);  // with the engine, before anything of an earlier run is touched
     engine_ = dem::make_engine(options_.backend, options_.threads);
     warnings_ = precheck(case_, start_, *engine_);
     const bool resuming = settle_old_output();
-    if (resuming && now_.finished) {
-      std::cerr << files_.checkpoint().string() << ": the case has finished already\n";
-      std::cout << summary(case_.stages, now_.rows);
-      return;
-    }
+    if (resuming && now_.finished) return {now_.rows, true};
     make_directories(files_.snapshots());
     progress_ = std::make_unique<Progress>(files_.log(), resuming, options_.quiet);
     try {
@@ -66,12 +63,12 @@ class Runner {
       progress_->say(std::string("stopped: ") + e.what() + after);
       throw error(e.what(), after);
     }
+    return {now_.rows, false};
   }
 
  private:
   // Resumes, refuses or clears what an earlier run has left. True if the run goes on from a checkpoint.
   bool settle_old_output() {
-    const bool found = fs::exists(files_.checkpoint()) || fs::exists(files_.series());
     if (options_.force) {
       for (const fs::path& p : files_.all()) {
         std::error_code failed;
@@ -81,11 +78,7 @@ class Runner {
       }
       return false;
     }
-    if (!found) return false;
-    if (!options_.resume)
-      throw error(files_.output.string(),
-                  ": holds the results of an earlier run; use --resume to go on from its checkpoint, or "
-                  "--force to replace it");
+    expect_no_results(options_);
     if (!fs::exists(files_.checkpoint())) return false;  // cut off before its first checkpoint
     now_ = output::read_checkpoint(files_.checkpoint());
     if (now_.case_text != case_.resolved)
@@ -114,9 +107,7 @@ class Runner {
     save();
     series_.reset();
     progress_->say("finished: " + files_.output.string());
-    const std::string table = summary(case_.stages, now_.rows);
-    progress_->log(table);
-    std::cout << table;
+    progress_->log(summary(case_.stages, now_.rows));
   }
 
   void run_stage(std::size_t index, bool resuming) {
@@ -162,6 +153,7 @@ class Runner {
         if (step % stage.series_every == 0 || step == stage.steps) record(stage);
         if (step % stage.snapshot_every == 0 || step == stage.steps) snapshot(stage);
       }
+      if (options_.on_progress) options_.on_progress(index, step, stage.steps);
       progress_->show({step, static_cast<double>(step) * stage.scene.dt, now_.rows.back().unbalanced_force});
       const bool stop = stop_requested;
       if (stop || step == stage.steps || seconds_since_save() > case_.output.checkpoint_interval) {
@@ -211,10 +203,29 @@ class Runner {
 
 }  // namespace
 
+void catch_signals() {
+  std::signal(SIGINT, [](int) { stop_requested = true; });
+  std::signal(SIGTERM, [](int) { stop_requested = true; });
+}
+bool stopping() { return stop_requested; }
+
+void expect_no_results(const Options& options) {
+  const Files files{options.directory / "output"};
+  if (!options.resume && !options.force && files.left_by_a_run())
+    throw error(files.output.string(),
+                ": holds the results of an earlier run; use --resume to go on from its checkpoint, or "
+                "--force to replace it");
+}
+
+Result run_one(const Options& options, const cases::Case& c) { return Runner(options, c).run(); }
+
 void run_case(const Options& options) {
-  std::signal(SIGINT, [](int) { stop_requested = 1; });
-  std::signal(SIGTERM, [](int) { stop_requested = 1; });
-  Runner(options).run();
+  catch_signals();
+  const cases::Case c = cases::load(options.directory, options.overrides);
+  const Result result = run_one(options, c);
+  if (result.was_finished)
+    std::cerr << Files{c.directory / "output"}.checkpoint().string() << ": the case has finished already\n";
+  std::cout << summary(c.stages, result.rows);
 }
 
 }  // namespace moraine::run

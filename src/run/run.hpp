@@ -1,11 +1,13 @@
 // Runs a case: its stages one after the other, with output, checkpoints and restart.
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "case/case.hpp"
 #include "dem/engine.hpp"
+#include "output/files.hpp"
 
 namespace moraine::run {
 
@@ -15,10 +17,27 @@ struct Options {
   dem::Backend backend = dem::Backend::automatic;
   int threads = 0;  // 0: all
   bool resume = false, force = false, quiet = false;
+  // Told every now and then: so many steps of so many of that stage are done.
+  std::function<void(std::size_t stage, std::int64_t step, std::int64_t steps)> on_progress;
 };
 
 // Throws Error; the last good checkpoint stays. Prints the summary of each stage to standard output.
 void run_case(const Options& options);
+
+// The same for one case among several in a process: prints nothing but its progress, and leaves signals
+// alone.
+struct Result {
+  std::vector<output::Row> rows;  // of the series
+  bool was_finished;              // by an earlier run
+};
+Result run_one(const Options& options, const cases::Case& c);
+
+// Throws Error where an earlier run has left results and neither resume nor force says what to do with them.
+void expect_no_results(const Options& options);
+
+// Control-C and an order to end make all runs of this process write a checkpoint and stop.
+void catch_signals();
+bool stopping();
 
 // Prints what run_case would do.
 void check_case(const Options& options);

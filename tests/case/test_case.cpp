@@ -158,6 +158,35 @@ TEST_F(CaseTest, overrides) {
   EXPECT_FALSE(c.floor);
 }
 
+// A name without its table: the one table that has it, or every stage that gives it.
+TEST_F(CaseTest, overrides_without_a_table) {
+  write(settle + shear);
+  const Case c = load({{"normal_stress", "40 kPa"}, {"count", "500"}});
+  EXPECT_EQ(c.stages[0].normal_stress, 0);
+  EXPECT_EQ(c.stages[1].normal_stress, 40e3);
+  EXPECT_EQ(c.grains.count, 500);
+  EXPECT_EQ(fault({{"mu_s", "0.3"}}),
+            "--set mu_s=0.3: expected the full name, one of contact.mu_s, stage.mu_s");
+  EXPECT_EQ(
+      fault({{"shear_stress", "1"}}),
+      "--set shear_stress=1: no stage gives this key in case.toml; expected stage.NAME.shear_stress with "
+      "NAME one of settle, shear");
+  EXPECT_EQ(fault({{"normal_stress", "40 m"}}),
+            "--set normal_stress=40 m: \"m\" has the wrong dimension; expected a unit convertible to Pa");
+}
+
+TEST_F(CaseTest, an_extension_is_the_case_with_its_overrides) {
+  files.write("bed.h5", "");
+  write(settle + shear);
+  const std::vector<Override> overrides{
+      {"normal_stress", "40 kPa"}, {"seed", "7"}, {"stages", "[\"shear\"]"}, {"start", "../bed.h5"}};
+  write(extension_text(files.path() / "x", overrides, "../../x"), "deep/y");
+  Case wanted = load(overrides), found = load({}, "deep/y");
+  EXPECT_EQ(found.start, wanted.start);
+  EXPECT_EQ(found.stages, wanted.stages);
+  EXPECT_EQ(found.grains, wanted.grains);
+}
+
 TEST_F(CaseTest, resolved_loads_to_the_same_case) {
   files.write("bed.h5", "");
   write("title = \"a \\\"b\\\" \\\\ \\n ü\"\nstart = \"../bed.h5\"\n" + settle, "base");

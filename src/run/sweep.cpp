@@ -1,0 +1,223 @@
+#include "run/sweep.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <cstdio>
+#include <deque>
+#include <iostream>
+#include <mutex>
+#include <thread>
+
+#include "backend/team.hpp"
+#include "error.hpp"
+#include "run/progress.hpp"
+#include "run/record.hpp"
+#include "run/sweep_plan.hpp"
+
+namespace moraine::run {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// Steps times grains up to a factor that all cases share; only for the time left. Where the height of the bed
+// decides how long a stage takes, it is taken for 1 m.
+double expected_work(const cases::Case& c, std::size_t stage) {
+  const cases::Stage& s = c.stages[stage];
+  const double rate = std::abs(s.strain_rate != 0 ? s.strain_rate : s.velocity);
+  const double duration = s.duration > 0 ? s.duration : s.strain / rate;
+  return duration / (c.dt > 0 ? c.dt : s.f) * static_cast<double>(c.grains.count);
+}
+
+struct Job {
+  enum class State { waiting, running, finished, failed };
+  PlannedCase plan;
+  Options options;
+  cases::Case what;
+  double work = 0;                                // of all stages
+  std::atomic<double> done = 0, done_before = 0;  // before: when this sweep took it up
+  State state = State::waiting;                   // this and below under the sweep's mutex
+  std::string message;
+  Result result{};
+};
+using State = Job::State;
+
+class Sweep {
+ public:
+  Sweep(const Options& options, int at_once)
+      : directory_(options.directory / "sweep"), screen_(options.quiet) {
+    Plan plan = plan_sweep(options.overrides);
+    columns_ = std::move(plan.columns);
+    const bool gpu = options.backend == dem::Backend::cuda ||
+                     (options.backend == dem::Backend::automatic && dem::cuda_device_present());
+    const int count = static_cast<int>(plan.cases.size());
+    const int threads = options.threads > 0 ? options.threads : available_cores();
+    at_once_ = std::min(count, at_once > 0 ? at_once : gpu ? count : threads);
+
+    // All cases are read and checked before the first one runs.
+    for (PlannedCase& planned : plan.cases) {
+      Job& job = jobs_.emplace_back();
+      job.what = cases::load(options.directory, planned.overrides);
+      job.options = options;
+      job.options.directory = directory_ / planned.name;
+      job.options.overrides.clear();  // they stand in its case.toml
+      job.options.threads = std::max(1, threads / at_once_);
+      job.options.quiet = true;
+      job.plan = std::move(planned);
+      expect_no_results(job.options);
+    }
+    for (Job& job : jobs_) {
+      std::error_code failed;
+      fs::create_directories(job.options.directory, failed);
+      if (failed) throw error(job.options.directory.string(), ": cannot be created: ", failed.message());
+      output::write_text(job.options.directory / "case.toml",
+                         "# Written by `moraine sweep`.\n" +
+                             cases::extension_text(options.directory, job.plan.overrides, "../.."));
+      job.what = cases::load(job.options.directory);
+      for (std::size_t k = 0; k < job.what.stages.size(); ++k) job.work += expected_work(job.what, k);
+    }
+  }
+
+  void run() {
+    screen_.say(std::to_string(jobs_.size()) + " cases, " + std::to_string(at_once_) + " at once, in " +
+                directory_.string());
+    std::vector<std::thread> workers;
+    for (int k = 0; k < at_once_; ++k) workers.emplace_back([this] { work(); });
+    watch();
+    for (std::thread& worker : workers) worker.join();
+    report();
+  }
+
+ private:
+  void work() {
+    while (Job* job = take()) {
+      std::string message;
+      Result result{};
+      try {
+        result = run_one(job->options, job->what);
+      } catch (const std::exception& e) {
+        message = e.what();
+      }
+      const std::lock_guard lock(mutex_);
+      job->state = message.empty() ? State::finished : State::failed;
+      job->message = message, job->result = std::move(result);
+      job->done = job->work;
+      news_.push_back(job);
+      changed_.notify_one();
+    }
+  }
+
+  Job* take() {
+    const std::lock_guard lock(mutex_);
+    if (stopping()) return nullptr;
+    const auto job =
+        std::find_if(jobs_.begin(), jobs_.end(), [](const Job& j) { return j.state == State::waiting; });
+    if (job == jobs_.end()) return nullptr;
+    job->state = State::running;
+    job->options.on_progress = [j = &*job, first = true](std::size_t stage, std::int64_t step,
+                                                         std::int64_t steps) mutable {
+      double done = expected_work(j->what, stage) * static_cast<double>(step) / static_cast<double>(steps);
+      for (std::size_t k = 0; k < stage; ++k) done += expected_work(j->what, k);
+      if (std::exchange(first, false)) j->done_before = j->options.resume ? done : 0;
+      j->done = done;
+    };
+    return &*job;
+  }
+
+  // Until all have ended: the only place that writes to the terminal meanwhile.
+  void watch() {
+    using namespace std::chrono_literals;
+    const auto began = std::chrono::steady_clock::now();
+    std::unique_lock lock(mutex_);
+    const auto going_on = [&] {
+      return count(State::running) > 0 || (count(State::waiting) > 0 && !stopping());
+    };
+    while (going_on() || !news_.empty()) {
+      changed_.wait_for(lock, 200ms);
+      for (; !news_.empty(); news_.pop_front()) {
+        const Job& job = *news_.front();
+        screen_.say(job.state == State::failed ? "stopped: " + job.plan.name + ": " + job.message
+                    : job.result.was_finished  ? "finished already: " + job.plan.name
+                                               : "finished: " + job.plan.name);
+      }
+      if (screen_.due()) screen_.show(progress(seconds_since(began)));
+    }
+  }
+
+  std::string progress(double seconds) const {
+    double done = 0, before = 0, all = 0;
+    for (const Job& job : jobs_) {
+      done += job.done, all += job.work;
+      before += job.result.was_finished ? job.work : job.done_before.load();
+    }
+    const double left = done > before ? (all - done) * seconds / (done - before) : 0;
+    char text[160];
+    std::snprintf(text, sizeof text, "%d running, %d of %zu finished, %d stopped  %5.1f %%  ETA %s",
+                  count(State::running), count(State::finished), jobs_.size(), count(State::failed),
+                  100 * done / all, left > 0 ? readable_time(left).c_str() : "unknown");
+    return text;
+  }
+
+  int count(State state) const {
+    return static_cast<int>(
+        std::count_if(jobs_.begin(), jobs_.end(), [&](const Job& j) { return j.state == state; }));
+  }
+
+  void report() const {
+    std::size_t width = 4;
+    for (const Job& job : jobs_) width = std::max(width, job.plan.name.size());
+    const auto in_width = [&](std::string name) { return name.append(width + 2 - name.size(), ' '); };
+    std::string table = in_width("case") + "friction: peak  smoothed  ultimate  dilation/diameters\n";
+    std::string csv = "case,";
+    for (const std::string& column : columns_) csv += column + ",";
+    csv += "state,peak,peak_strain,smoothed_peak,ultimate,dilation_diameters\n";
+
+    std::string stopped, not_begun;
+    for (const Job& job : jobs_) {
+      const bool finished = job.state == State::finished;
+      const auto s = finished ? final_strength(job.what.stages, job.result.rows) : std::optional<Strength>{};
+      const std::string state = finished ? "finished" : job.state == State::waiting ? "not begun" : "stopped";
+      char line[160] = "", numbers[160] = ",,,,";
+      if (s) {
+        std::snprintf(line, sizeof line, "%14.4f%10.4f%10.4f%+14.4f", s->peak, s->smoothed_peak, s->ultimate,
+                      s->dilation_diameters);
+        std::snprintf(numbers, sizeof numbers, "%.9g,%.9g,%.9g,%.9g,%.9g", s->peak, s->peak_strain,
+                      s->smoothed_peak, s->ultimate, s->dilation_diameters);
+      }
+      table += in_width(job.plan.name) + (s ? line : finished ? "no shear stage" : state) + "\n";
+      csv += job.plan.name + ",";
+      for (const std::string& value : job.plan.values) csv += value + ",";
+      csv += state + "," + numbers + "\n";
+      if (job.state == State::failed) stopped += "\n  " + job.plan.name + ": " + job.message;
+      if (job.state == State::waiting) not_begun += "\n  " + job.plan.name + ": not begun";
+    }
+    output::write_text(directory_ / "summary.csv", csv);
+    std::cout << table << "of the last shear stage; also in " << (directory_ / "summary.csv").string()
+              << "\n";
+    if (const int missing = static_cast<int>(jobs_.size()) - count(State::finished))
+      throw error(missing, " of ", jobs_.size(),
+                  " cases did not finish (--resume goes on with them):", stopped, not_begun);
+  }
+
+  fs::path directory_;
+  std::vector<std::string> columns_;
+  Screen screen_;
+  int at_once_ = 1;
+  std::deque<Job> jobs_;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<const Job*> news_;
+};
+
+}  // namespace
+
+void sweep_case(const Options& options, int at_once) {
+  catch_signals();
+  Sweep(options, at_once).run();
+}
+
+}  // namespace moraine::run
