@@ -114,6 +114,15 @@ void Guard::check(const dem::State& s) {
   check_energy(s);
 }
 
+bool Guard::finds_healthy(const dem::State& s) const {
+  try {
+    Guard(*this).check(s);
+  } catch (const Error&) {
+    return false;
+  }
+  return true;
+}
+
 void Guard::check_energy(const dem::State& s) {
   const double energy_0 = stored(first_) + first_.potential;
   const output::Row now = row_of(static_cast<std::size_t>(first_.stage), stage_, s, 0, energy_0);

@@ -157,8 +157,8 @@ class Runner {
       progress_->show({step, static_cast<double>(step) * stage.scene.dt, now_.rows.back().unbalanced_force});
       const bool stop = stop_requested;
       if (stop || step == stage.steps || seconds_since_save() > case_.output.checkpoint_interval) {
-        if (step != event) guard.check(now_.state = engine_->state());
-        save();
+        if (step != event) now_.state = engine_->state();
+        if (step == event || guard.finds_healthy(now_.state)) save();
       }
       if (stop)
         throw error("interrupted at step ", step, " of stage ", stage.name, "; --resume goes on from here");

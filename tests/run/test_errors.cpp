@@ -127,7 +127,7 @@ TEST_F(Errors, OutputNotWritable) {
 
 TEST_F(Errors, BlowUpNamesGrainAndStep) {
   const fs::path small = make("small", small_case());
-  expect_error(to_run(small, {"model.f=30"}),
+  expect_error(to_run(small, {"model.f=30", "stage.settle.wall_gamma_n=0", "stage.settle.wall_gamma_t=0"}),
                {"grain ", " at step ", "position (", "smaller model.f", "the last good checkpoint stays in",
                 "small/output/checkpoint.h5"});
   const output::Checkpoint kept = output::read_checkpoint(checkpoint_of(small));

@@ -117,7 +117,8 @@ TEST_F(Sweep, SameBitsAsAlone) {
 // Each of them is a case like any other.
 TEST_F(Sweep, ItsCasesRunOnTheirOwn) {
   const fs::path small = make("small", small_case());
-  ASSERT_EQ(moraine(to_sweep(small, "seed=4,5")).status, 0);
+  const Outcome o = moraine(to_sweep(small, "seed=4,5"));
+  ASSERT_EQ(o.status, 0) << o.err;
   const fs::path swept = small / "sweep/seed-4", copy = small / "sweep/copy";
   fs::create_directories(copy);
   fs::copy_file(swept / "case.toml", copy / "case.toml");
