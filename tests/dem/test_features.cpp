@@ -1,0 +1,36 @@
+// What a scene does not use is not compiled into its loop, and so costs nothing.
+#include "dem/features.hpp"
+
+#include <gtest/gtest.h>
+
+namespace moraine::dem {
+namespace {
+
+Features of(const ContactParameters& grain, const ContactParameters& wall = {1e7, 0, 0, 0, 0, 0}) {
+  Scene s;
+  s.grain = grain, s.wall = wall;
+  return features_of(s);
+}
+
+TEST(Features, FrictionTakesBothMuAndATangentialForce) {
+  EXPECT_TRUE(of({1e7, 1e7, 0, 0, 0.5, 0.5}).friction);
+  EXPECT_FALSE(of({1e7, 1e7, 0, 0, 0, 0}).friction);
+  EXPECT_FALSE(of({1e7, 0, 0, 0, 0.5, 0.5}).friction);
+  EXPECT_TRUE(of({1e7, 0, 0, 5, 0.5, 0.5}).friction);
+  EXPECT_TRUE(of({1e7, 1e7, 0, 0, 0, 0}, {1e7, 1e7, 0, 0, 0.5, 0.5}).friction);
+}
+
+TEST(Features, DampingTakesAViscosity) {
+  EXPECT_FALSE(of({1e7, 1e7, 0, 0, 0.5, 0.5}).viscous);
+  EXPECT_TRUE(of({1e7, 1e7, 5, 0, 0.5, 0.5}).viscous);
+  EXPECT_TRUE(of({1e7, 1e7, 0, 5, 0.5, 0.5}).viscous);
+}
+
+TEST(Features, SofteningTakesASmallerDynamicFriction) {
+  EXPECT_FALSE(of({1e7, 1e7, 0, 0, 0.5, 0.5}).softening);
+  EXPECT_TRUE(of({1e7, 1e7, 0, 0, 0.5, 0.3}).softening);
+  EXPECT_FALSE(of({1e7, 0, 0, 0, 0.5, 0.3}).softening);  // no friction to soften
+}
+
+}  // namespace
+}  // namespace moraine::dem
