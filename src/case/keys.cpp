@@ -209,6 +209,8 @@ string word_of(const Key& key) {
   return key.type == Type::number && accepted.size() == 2 ? accepted[1] : "";
 }
 
+string or_word(const Key& key) { return word_of(key).empty() ? "" : ", or " + quoted(word_of(key)); }
+
 void check_range(const Key& key, const Value& value) {
   if (key.type == Type::choice) {
     const auto choices = split(key.accepts, " | ");
@@ -222,8 +224,7 @@ void check_range(const Key& key, const Value& value) {
   const std::int64_t* integer = std::get_if<std::int64_t>(&value);
   if ((number && !in_range(key.accepts, *number)) || (integer && !in_range(key.accepts, double(*integer))))
     throw error("expected ", split(key.accepts, " | ")[0],
-                key.unit.empty() || key.unit == "1" ? "" : " " + key.unit,
-                word_of(key).empty() ? "" : ", or \"" + word_of(key) + "\"");
+                key.unit.empty() || key.unit == "1" ? "" : " " + key.unit, or_word(key));
 }
 
 string suggestion(const string& unknown_key, const string& shown) {

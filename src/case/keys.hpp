@@ -36,6 +36,7 @@ const Key* find(const std::string& name);  // null: no such key
 
 // The word that may stand for a number ("auto" in ">= 0 | auto"); empty where there is none.
 std::string word_of(const Key& key);
+std::string or_word(const Key& key);  // for errors: `, or "auto"`
 
 // Throws Error with what was expected.
 void check_range(const Key& key, const Value& value);

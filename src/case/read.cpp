@@ -65,7 +65,7 @@ Value convert(const Key& key, const toml::node& node) {
         try {
           return number(key, node);
         } catch (const Error& e) {
-          throw error(e.what(), ", or \"", word, "\"");
+          throw error(e.what(), or_word(key));
         }
       }
       return number(key, node);
