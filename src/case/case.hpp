@@ -78,6 +78,8 @@ struct Case {
   double wall_mass;         // kg; 0: 0.001 of the mass of N spheres as wide as a lattice cell
   double gravity;           // m/s2
   double dt;                // s; 0: by eq. 9
+  bool automatic_dt;        // dt follows the contact network instead
+  double safety;            // of the critical step, with automatic_dt
   double neighbour_margin;  // m; 0: automatic
   bool ledger;
   std::vector<Stage> stages;

@@ -46,6 +46,11 @@ void set_periodic(const Key&, Case& c, Stage&, const Value& value) {
   c.periodic_x = has('x'), c.periodic_y = has('y'), c.periodic_z = has('z');
 }
 
+void set_dt(const Key&, Case& c, Stage&, const Value& value) {
+  c.automatic_dt = std::holds_alternative<string>(value);
+  c.dt = c.automatic_dt ? 0 : std::get<double>(value);
+}
+
 void set_nothing(const Key&, Case&, Stage&, const Value&) {}  // only a default for the stages
 
 template <class T>
@@ -110,7 +115,8 @@ std::vector<Key> make_keys() {
 
       row<&C::gravity>("model.gravity", "m/s2", "9.80665", ">= 0", "along -z"),
       {"model.f", Type::number, "1", "0.075", "> 0", "time step in units of sqrt(min m / max(k_n, k_t)), eq. 9; a stage may have its own", "", set_nothing},
-      row<&C::dt>("model.dt", "s", "0", ">= 0", "time step; 0: by f"),
+      {"model.dt", Type::number, "s", "0", ">= 0 | auto", "time step; 0: by f; \"auto\": safety times the critical step of the present contact network", "", set_dt},
+      row<&C::safety>("model.safety", "1", "0.5", "0.01 .. 1", "dt = \"auto\": share of the critical step"),
       row<&C::neighbour_margin>("model.neighbour_margin", "m", "0", ">= 0", "of the neighbour list; 0: automatic; changes no result"),
       row<&C::ledger>("model.ledger", "", "true", "", "account for every joule"),
 
@@ -203,6 +209,13 @@ const Key* find(const string& name) {
   return k == keys().end() ? nullptr : &*k;
 }
 
+string word_of(const Key& key) {
+  const auto accepted = split(key.accepts, " | ");
+  return key.type == Type::number && accepted.size() == 2 ? accepted[1] : "";
+}
+
+string or_word(const Key& key) { return word_of(key).empty() ? "" : ", or " + quoted(word_of(key)); }
+
 void check_range(const Key& key, const Value& value) {
   if (key.type == Type::choice) {
     const auto choices = split(key.accepts, " | ");
@@ -215,7 +228,8 @@ void check_range(const Key& key, const Value& value) {
   const double* number = std::get_if<double>(&value);
   const std::int64_t* integer = std::get_if<std::int64_t>(&value);
   if ((number && !in_range(key.accepts, *number)) || (integer && !in_range(key.accepts, double(*integer))))
-    throw error("expected ", key.accepts, key.unit.empty() || key.unit == "1" ? "" : " " + key.unit);
+    throw error("expected ", split(key.accepts, " | ")[0],
+                key.unit.empty() || key.unit == "1" ? "" : " " + key.unit, or_word(key));
 }
 
 string suggestion(const string& unknown_key, const string& shown) {

@@ -20,7 +20,8 @@ struct Key {
   std::string unit;      // SI
   std::string fallback;  // TOML, or the name of the key it is taken from; "0; settle, consolidate: 1e4" by
                          // kind of stage
-  std::string accepts;   // "> 0", ">= 1", "1 .. 10"; "this | that" makes a choice
+  std::string accepts;   // "> 0", ">= 1", "1 .. 10"; "this | that" makes a choice,
+                         // ">= 0 | auto" a number or that word
   std::string meaning;
   std::string kinds;                                     // the kinds of stage it belongs to; empty: all
   void (*set)(const Key&, Case&, Stage&, const Value&);  // null: merging uses it up
@@ -32,6 +33,10 @@ inline const std::string required = "(required)";  // a `fallback`
 
 const std::vector<Key>& keys();            // a default refers only to rows above its own
 const Key* find(const std::string& name);  // null: no such key
+
+// The word that may stand for a number ("auto" in ">= 0 | auto"); empty where there is none.
+std::string word_of(const Key& key);
+std::string or_word(const Key& key);  // for errors: `, or "auto"`
 
 // Throws Error with what was expected.
 void check_range(const Key& key, const Value& value);

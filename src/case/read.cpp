@@ -60,6 +60,14 @@ double number(const Key& key, const toml::node& node) {
 Value convert(const Key& key, const toml::node& node) {
   switch (key.type) {
     case Type::number:
+      if (const string word = word_of(key); !word.empty() && node.is_string()) {
+        if (*node.value<string>() == word) return word;
+        try {
+          return number(key, node);
+        } catch (const Error& e) {
+          throw error(e.what(), or_word(key));
+        }
+      }
       return number(key, node);
     case Type::integer: {
       if (const auto integer = node.value_exact<std::int64_t>()) return *integer;

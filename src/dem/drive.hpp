@@ -56,7 +56,7 @@ struct Drive {
   }
   MORAINE_HD void take(const Scene& s, const Reaction& reaction) {
     at = reaction;
-    sigma = s.normal_stress(static_cast<double>(step) * s.dt);
+    sigma = s.normal_stress(s.time(step));
     wall_v_now = fma(wall_acceleration(s), 0.5 * s.dt, wall_v);
     layer_u_now = fma(layer_acceleration(s), 0.5 * s.dt, layer_u);
   }

@@ -49,4 +49,8 @@ bool cuda_device_present();
 // Velocities and spins from n - 1/2 to n, as between stages.
 void synchronise(const Scene& scene, State& state);
 
+// Goes on with another time step from here: velocities and spins to n and back by half a new step, with the
+// forces as they stand. Second order, as the scheme is; load() the result.
+void change_step(Scene& scene, State& state, double dt);
+
 }  // namespace moraine::dem

@@ -67,10 +67,9 @@ Drive drive_of(const Scene& scene, const State& s) {
 Error lost_grain(const Scene& scene, const Drive& drive, const GrainRow& g, Index id) {
   std::ostringstream place;
   place.precision(9);
-  place << "grain " << id << " at step " << drive.step
-        << " (t = " << static_cast<double>(drive.step) * scene.dt << " s of the stage), position (" << g.x.x
-        << ", " << g.x.y << ", " << g.x.z << ") m, velocity (" << g.v.x << ", " << g.v.y << ", " << g.v.z
-        << ") m/s: ";
+  place << "grain " << id << " at step " << drive.step << " (t = " << scene.time(drive.step)
+        << " s of the stage), position (" << g.x.x << ", " << g.x.y << ", " << g.x.z << ") m, velocity ("
+        << g.v.x << ", " << g.v.y << ", " << g.v.z << ") m/s: ";
   const char* remedy =
       "; the step may be too long for the stiffness, or grains overlapped deeply: try a smaller model.f";
   if (!(dot(g.x, g.x) + dot(g.v, g.v) + dot(g.omega, g.omega) < 1e300))
@@ -135,6 +134,23 @@ void synchronise(const Scene& scene, State& s) {
   d.half_step(scene, 1);
   s.wall_v = d.wall_v, s.layer_u = d.layer_u;
   s.staggered = false;
+}
+
+void change_step(Scene& scene, State& s, double dt) {
+  const bool staggered = s.staggered;
+  synchronise(scene, s);
+  scene.time_0 = scene.time(s.step), scene.step_0 = s.step;
+  scene.dt = dt;
+  if (!staggered) return;
+  for (Index i = 0; i < s.size(); ++i) {
+    const Mobility m = mobility(scene, s.r[i], s.role[i]);
+    s.v[i] = axpy(-0.5 * dt, m.acceleration(s.force[i]), s.v[i]);
+    s.omega[i] = axpy(-0.5 * dt, m.spin_acceleration(s.torque[i]), s.omega[i]);
+  }
+  Drive d = drive_of(scene, s);
+  d.half_step(scene, -1);
+  s.wall_v = d.wall_v, s.layer_u = d.layer_u;
+  s.staggered = true;
 }
 
 }  // namespace moraine::dem

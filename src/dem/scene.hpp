@@ -1,11 +1,12 @@
 // A checked description of one stage: what surrounds the grains and what drives them. Constant while the
-// stage runs.
+// stage runs, but for the time step where that follows the bed.
 //
 // Signs, for the whole code: x is the shear direction, z points up, gravity acts along -z. Stresses are
 // positive in compression. An overlap is a negative delta_n. A force "on the wall" by the grains is positive
 // upwards. SI units everywhere; J, N, Pa, m, s, kg.
 #pragma once
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 
 #include "dem/vec3.hpp"
@@ -46,10 +47,12 @@ struct Shear {
 struct Scene {
   Vec3d box{0, 0, 0};  // m; side lengths. z matters only where it is periodic.
   bool periodic_x = true, periodic_y = true, periodic_z = false;
-  bool floor = true;              // fixed wall at z = 0
-  double gravity = 9.80665;       // m/s2
-  double density = 2600;          // kg/m3, of the grains
-  double dt = 0;                  // s
+  bool floor = true;         // fixed wall at z = 0
+  double gravity = 9.80665;  // m/s2
+  double density = 2600;     // kg/m3, of the grains
+  double dt = 0;             // s
+  double time_0 = 0;         // s, since the stage began, at step_0: where this dt began
+  std::int64_t step_0 = 0;
   ContactParameters grain, wall;  // grain to grain, grain to wall
   TopWall top_wall;
   Shear shear;
@@ -57,6 +60,9 @@ struct Scene {
   bool ledger = true;           // account for every joule (state.hpp)
 
   double area() const { return box.x * box.y; }  // m2
+
+  // s, since the stage began.
+  MORAINE_HD double time(std::int64_t step) const { return time_0 + static_cast<double>(step - step_0) * dt; }
 
   // Normal stress asked of the top wall, Pa; t in s since the stage began.
   MORAINE_HD double normal_stress(double t) const {

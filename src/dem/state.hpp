@@ -60,7 +60,7 @@ struct State {
   double layer_u = 0;      // m/s, velocity of the top layer
   Ledger ledger;
 
-  std::int64_t step = 0;  // steps since the stage began; t = step dt
+  std::int64_t step = 0;  // steps since the stage began; t = Scene::time(step)
   bool staggered = false;
 
   Index size() const { return static_cast<Index>(r.size()); }

@@ -14,7 +14,7 @@ inline constexpr bool hdf5::all_doubles<Row> = true;
 
 namespace {
 
-constexpr std::int64_t format = 1;  // raise it with every change to a struct below
+constexpr std::int64_t format = 2;  // raise it with every change to a struct below
 
 // Every member of every stored struct, once, for writing and for reading. A new member is one more line; one
 // that is forgotten does not compile.
@@ -60,6 +60,8 @@ constexpr std::tuple members<dem::Scene>{
     Member{"gravity", &dem::Scene::gravity},
     Member{"density", &dem::Scene::density},
     Member{"dt", &dem::Scene::dt},
+    Member{"time_0", &dem::Scene::time_0},
+    Member{"step_0", &dem::Scene::step_0},
     Member{"grain", &dem::Scene::grain},
     Member{"wall", &dem::Scene::wall},
     Member{"top_wall", &dem::Scene::top_wall},
@@ -127,11 +129,18 @@ constexpr std::tuple members<SnapshotInfo>{
 
 template <>
 constexpr std::tuple members<Checkpoint>{
-    Member{"case_text", &Checkpoint::case_text}, Member{"version", &Checkpoint::version},
-    Member{"stage", &Checkpoint::stage},         Member{"stage_start_time", &Checkpoint::stage_start_time},
-    Member{"height_0", &Checkpoint::height_0},   Member{"energy_0", &Checkpoint::energy_0},
-    Member{"finished", &Checkpoint::finished},   Member{"scene", &Checkpoint::scene},
-    Member{"state", &Checkpoint::state},         Member{"rows", &Checkpoint::rows},
+    Member{"case_text", &Checkpoint::case_text},
+    Member{"version", &Checkpoint::version},
+    Member{"stage", &Checkpoint::stage},
+    Member{"stage_start_time", &Checkpoint::stage_start_time},
+    Member{"height_0", &Checkpoint::height_0},
+    Member{"energy_0", &Checkpoint::energy_0},
+    Member{"critical_step", &Checkpoint::critical_step},
+    Member{"critical_at", &Checkpoint::critical_at},
+    Member{"finished", &Checkpoint::finished},
+    Member{"scene", &Checkpoint::scene},
+    Member{"state", &Checkpoint::state},
+    Member{"rows", &Checkpoint::rows},
     Member{"snapshots", &Checkpoint::snapshots},
 };
 
@@ -310,7 +319,11 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
   file.get("format", found);
   if (found > format) {
     throw error(file.where(), ": written by a later version of moraine (checkpoint format ", found,
-                "; this one reads up to ", format, ")");
+                "; this one reads ", format, ")");
+  }
+  if (found < format) {
+    throw error(file.where(), ": written by an earlier version of moraine (checkpoint format ", found,
+                "; this one reads ", format, "); run its case again");
   }
   Checkpoint checkpoint;
   for_each_member<Checkpoint>([&](const char* name, auto pointer) { get(file, name, checkpoint.*pointer); });

@@ -84,6 +84,9 @@ struct Checkpoint {
   double stage_start_time = 0;  // s, since the case began
   double height_0 = 0;          // m, when the stage began
   double energy_0 = 0;          // J, when the stage began
+  // With dt = "auto": the critical step of the contact network, s, and the step of the stage it was found at.
+  double critical_step = 0;
+  std::int64_t critical_at = 0;
   bool finished = false;
   dem::Scene scene;  // of the stage
   dem::State state;

@@ -188,7 +188,7 @@ SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::s
   file.set("name", name);
   file.set("time", time);
   file.set("step", staggered.step);
-  file.set("stage_time", static_cast<double>(staggered.step) * scene.dt);
+  file.set("stage_time", scene.time(staggered.step));
   file.set("box", scene.box);
   file.set("top_wall", staggered.wall_z);
   write_grains(file.create_group("grains"), scene, staggered);

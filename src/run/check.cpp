@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <iostream>
 
+#include "dem/spectrum.hpp"
 #include "run/precheck.hpp"
 #include "run/progress.hpp"
 #include "run/run.hpp"
@@ -70,6 +71,15 @@ void check_case(const Options& options) {
     std::printf("  stage %zu: %s\n", k + 1, wanted.name.c_str());
     std::printf("    step        %.4g s, %.3g of the two-body limit 2/omega_0; %.0f steps for %.4g s\n",
                 scene.dt, scene.dt / critical, steps, duration);
+    const double network = dem::critical_step(dem::spectrum(scene, s));
+    if (std::isfinite(network))
+      std::printf(
+          "    network     %.4g s critical with the contacts of the start; the step is %.3g of it%s\n",
+          network, scene.dt / network,
+          scene.dt > network ? "  (above 1: the bed will blow up; take a smaller step or dt = \"auto\")"
+                             : "");
+    if (c.automatic_dt)
+      std::printf("    dt = auto   %.3g of the critical step, as the contacts come and go\n", c.safety);
     if (wanted.normal_stress > 0) {
       const double r = 0.5 * diameter;
       std::printf(

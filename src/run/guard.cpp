@@ -22,7 +22,7 @@ std::string triple(const dem::Vec3d& a) {
 
 std::string when(const Stage& stage, const dem::State& s) {
   std::ostringstream text;
-  text << " at step " << s.step << " (t = " << static_cast<double>(s.step) * stage.scene.dt << " s) of stage "
+  text << " at step " << s.step << " (t = " << stage.scene.time(s.step) << " s) of stage "
        << stage.name;
   return text.str();
 }

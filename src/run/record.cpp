@@ -36,7 +36,7 @@ output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, d
   output::Row row{};
   row.stage = static_cast<double>(index);
   row.step = static_cast<double>(s.step);
-  row.stage_time = row.step * stage.scene.dt;
+  row.stage_time = stage.scene.time(s.step);
   row.time = time_0 + row.stage_time;
   row.shear_strain = shears(stage.kind) ? layer_displacement(s) / stage.height_0 : 0;
   row.shear_stress = o.shear_stress;

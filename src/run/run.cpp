@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <iostream>
@@ -13,6 +14,7 @@
 #include "run/precheck.hpp"
 #include "run/progress.hpp"
 #include "run/record.hpp"
+#include "run/schedule.hpp"
 #include "run/stages.hpp"
 
 namespace moraine::run {
@@ -123,46 +125,67 @@ class Runner {
       engine_->load(stage.scene, now_.state);
       now_.state = engine_->state();
       now_.scene = stage.scene, now_.height_0 = stage.height_0;
+      if (case_.automatic_dt) {
+        now_.critical_at = -steps_between_estimates;
+        follow_bed(stage);
+      }
       now_.energy_0 = dem::observe(stage.scene, now_.state).energy.total();
       record(stage);
       snapshot(stage);
       if (index == 0) save();
     }
     char text[200];
-    std::snprintf(text, sizeof text, "stage %s: %lld steps of %.3g s", stage.name.c_str(),
-                  static_cast<long long>(stage.steps), stage.scene.dt);
-    progress_->say(text);
     std::int64_t step = now_.state.step;
-    progress_->begin(stage.name, step, stage.steps, 0);
+    const auto steps = step + std::llround((stage.duration - stage.scene.time(step)) / stage.scene.dt);
+    std::snprintf(text, sizeof text, "stage %s: %lld steps of %.3g s%s", stage.name.c_str(),
+                  static_cast<long long>(steps), stage.scene.dt,
+                  case_.automatic_dt ? ", which follows the bed" : "");
+    progress_->say(text);
+    progress_->begin(stage.name, step, steps, 0);
 
     Guard guard(case_.guards, stage, now_.rows);
     std::int64_t slice = 64;  // steps between looks at the clock
-    while (step < stage.steps) {
-      const auto next = [&](std::int64_t every) { return (step / every + 1) * every; };
-      const std::int64_t event =
-          std::min({next(stage.series_every), next(stage.snapshot_every), next(guard.every()), stage.steps});
-      const std::int64_t until = std::min(event, step + slice);
+    for (bool ended = stage.scene.time(step) > stage.duration - 0.5 * stage.scene.dt; !ended;) {
+      const Event event = next_event(stage, step);
+      const std::int64_t look = (step / guard.every() + 1) * guard.every();
+      std::int64_t until = std::min({event.step, look, step + slice});
+      const std::int64_t estimate = now_.critical_at + steps_between_estimates;
+      if (case_.automatic_dt) until = std::min(until, estimate);
       const auto began = std::chrono::steady_clock::now();
       engine_->advance(until - step);
       const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
       if (took < 0.1 && until == step + slice) slice *= 2;
       step = until;
-      if (step == event) {
-        now_.state = engine_->state();
-        guard.check(now_.state);
-        if (step % stage.series_every == 0 || step == stage.steps) record(stage);
-        if (step % stage.snapshot_every == 0 || step == stage.steps) snapshot(stage);
+      const bool due = step == event.step;
+      ended = due && event.end;
+      if (due || step == look) guard.check(now_.state = engine_->state());
+      if (due) {
+        if (event.series) record(stage);
+        if (event.snapshot) snapshot(stage);
       }
-      if (options_.on_progress) options_.on_progress(index, step, stage.steps);
-      progress_->show({step, static_cast<double>(step) * stage.scene.dt, now_.rows.back().unbalanced_force});
+      if (case_.automatic_dt && !ended && (due || step == estimate)) follow_bed(stage);
+      if (options_.on_progress) options_.on_progress(index, step, std::max<std::int64_t>(step, steps));
+      progress_->show({step, stage.scene.time(step), now_.rows.back().unbalanced_force});
       const bool stop = stop_requested;
-      if (stop || step == stage.steps || seconds_since_save() > case_.output.checkpoint_interval) {
-        if (step != event) now_.state = engine_->state();
-        if (step == event || guard.finds_healthy(now_.state)) save();
+      if (stop || ended || seconds_since_save() > case_.output.checkpoint_interval) {
+        if (!due) now_.state = engine_->state();
+        if (due || guard.finds_healthy(now_.state)) save();
       }
       if (stop)
         throw error("interrupted at step ", step, " of stage ", stage.name, "; --resume goes on from here");
     }
+  }
+
+  // The time step from here on.
+  void follow_bed(Stage& stage) {
+    now_.state = engine_->state();
+    if (now_.state.step == now_.critical_at + steps_between_estimates) {
+      now_.critical_step = critical_step(stage.scene, now_.state);
+      now_.critical_at = now_.state.step;
+    }
+    fit_step(stage, now_.state, case_.safety * now_.critical_step);
+    engine_->load(stage.scene, now_.state);
+    now_.scene = stage.scene;
   }
 
   void record(const Stage& stage) {
@@ -173,9 +196,9 @@ class Runner {
 
   void snapshot(const Stage& stage) {
     char name[80];
-    std::snprintf(
-        name, sizeof name, "%02d-%s-%06lld", static_cast<int>(now_.stage) + 1, stage.name.c_str(),
-        static_cast<long long>((now_.state.step + stage.snapshot_every - 1) / stage.snapshot_every));
+    std::snprintf(name, sizeof name, "%02d-%s-%06lld", static_cast<int>(now_.stage) + 1, stage.name.c_str(),
+                  static_cast<long long>(std::ceil(
+                      (stage.scene.time(now_.state.step) - 0.5 * stage.scene.dt) / stage.snapshot_interval)));
     now_.snapshots.push_back(
         output::write_snapshot(files_.snapshots(), name, now_.rows.back().time, stage.scene, now_.state));
     output::write_xdmf(files_.snapshots(), now_.snapshots);

@@ -8,6 +8,7 @@
 #include "dem/packing.hpp"
 #include "error.hpp"
 #include "output/files.hpp"
+#include "run/schedule.hpp"
 
 namespace moraine::run {
 
@@ -117,11 +118,8 @@ Stage describe(const cases::Case& c, std::size_t index, const dem::Scene& scene,
   out.name = stage.name, out.kind = stage.kind, out.scene = scene, out.height_0 = height_0;
   out.diameter = mean_diameter(state);
   out.strain_rate = shears(stage.kind) ? scene.shear.velocity / height_0 : stage.strain_rate;
-  const double duration = stage.duration > 0 ? stage.duration : stage.strain / std::abs(out.strain_rate);
-  const auto in_steps = [&](double t) { return std::max<std::int64_t>(1, std::llround(t / scene.dt)); };
-  out.steps = in_steps(duration);
-  out.series_every = in_steps(c.output.series_interval);
-  out.snapshot_every = in_steps(c.output.snapshot_interval);
+  out.duration = stage.duration > 0 ? stage.duration : stage.strain / std::abs(out.strain_rate);
+  out.series_interval = c.output.series_interval, out.snapshot_interval = c.output.snapshot_interval;
   return out;
 }
 
@@ -156,10 +154,14 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, dem::
     s.x_start = s.x;
     s.layer_u = 0;
   }
-  scene.dt = c.dt > 0 ? c.dt : step_by_eq_9(scene, s, stage.f);
   s.step = 0, s.staggered = false, s.ledger = {};
   dem::sort_spatially(scene, s);
-  return describe(c, index, scene, height_0, s);
+  scene.dt = c.automatic_dt ? c.safety * critical_step(scene, s)
+             : c.dt > 0     ? c.dt
+                            : step_by_eq_9(scene, s, stage.f);
+  Stage out = describe(c, index, scene, height_0, s);
+  if (c.automatic_dt) fit_step(out, s, scene.dt);
+  return out;
 }
 
 }  // namespace moraine::run

@@ -1,5 +1,5 @@
 // From a checked case to what the engine needs: the grains at the start, and for each stage its scene, its
-// number of steps, and the state made ready (Damsgaard et al. 2013, par. 26).
+// duration, and the state made ready (Damsgaard et al. 2013, par. 26).
 #pragma once
 #include <string>
 
@@ -21,8 +21,8 @@ struct Stage {
   std::string name;
   cases::Stage::Kind kind;
   dem::Scene scene;
-  std::int64_t steps;
-  std::int64_t series_every, snapshot_every;  // steps
+  double duration;                            // s
+  double series_interval, snapshot_interval;  // s
   double height_0;                            // m
   double diameter;                            // m, mean of the grains
   double strain_rate;                         // 1/s, nominal: u/H_0, or axial

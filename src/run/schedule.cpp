@@ -1,0 +1,46 @@
+#include "run/schedule.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dem/engine.hpp"
+#include "dem/spectrum.hpp"
+
+namespace moraine::run {
+
+namespace {
+
+std::int64_t step_at(const dem::Scene& scene, double time) {
+  return scene.step_0 + std::llround((time - scene.time_0) / scene.dt);
+}
+
+// The next multiple of the interval that a later step is nearest to.
+double next_multiple(const dem::Scene& scene, double interval, std::int64_t step) {
+  double k = std::max(1.0, std::floor(scene.time(step) / interval));
+  while (step_at(scene, k * interval) <= step) ++k;
+  return k * interval;
+}
+
+}  // namespace
+
+Event next_event(const Stage& stage, std::int64_t step) {
+  const dem::Scene& scene = stage.scene;
+  const double series = next_multiple(scene, stage.series_interval, step);
+  const double snapshot = next_multiple(scene, stage.snapshot_interval, step);
+  const double time = std::min({series, snapshot, stage.duration});
+  const std::int64_t at = step_at(scene, time);
+  const bool end = at >= step_at(scene, stage.duration);
+  return {end ? stage.duration : time, std::max(at, step + 1), end || at == step_at(scene, series),
+          end || at == step_at(scene, snapshot), end};
+}
+
+double critical_step(const dem::Scene& scene, const dem::State& state) {
+  return std::min(dem::critical_step(dem::spectrum(scene, state)), dem::one_contact_step(scene, state));
+}
+
+void fit_step(Stage& stage, dem::State& state, double longest) {
+  const double left = next_event(stage, state.step).time - stage.scene.time(state.step);
+  dem::change_step(stage.scene, state, left / std::ceil(left / longest));
+}
+
+}  // namespace moraine::run
