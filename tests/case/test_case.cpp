@@ -218,7 +218,8 @@ TEST_F(CaseTest, unknown_keys_name_the_nearest) {
   EXPECT_EQ(fault_of("[contcat]\nmu_s = 9\n" + settle),
             "x/case.toml:1: [contcat]: unknown table; did you mean [contact]?");
   EXPECT_EQ(fault_of("[fluid]\nmu = 9\n" + settle),
-            "x/case.toml:1: [fluid]: unknown table; known: box, grains, contact, wall, model, stage, output, guards");
+            "x/case.toml:1: [fluid]: unknown table; known: box, grains, contact, wall, model, stage, output, "
+            "guards");
   EXPECT_EQ(fault_of("[wall]\nroughness = 9\n" + settle),
             "x/case.toml:2: wall.roughness = 9: unknown key; known here: k_t, mass");
   EXPECT_EQ(
