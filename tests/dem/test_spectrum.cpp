@@ -1,6 +1,7 @@
 // Contact networks with known spectra, and what a run does on either side of the critical step.
 #include "dem/spectrum.hpp"
 
+#include "error.hpp"
 #include "physics/scenes.hpp"
 
 namespace moraine::dem {
@@ -18,11 +19,11 @@ Scene column() {
   s.top_wall.drive = TopWall::Drive::velocity;
   return s;
 }
-State stack(int n) {
+State stack(int n, double closed = overlap) {
   std::vector<Vec3d> x;
-  for (int i = 0; i < n; ++i) x.push_back({d, d, r - overlap + i * (d - overlap)});
+  for (int i = 0; i < n; ++i) x.push_back({d, d, r - closed + i * (d - closed)});
   State s = grains_at_rest(std::vector<double>(x.size(), r), x);
-  s.wall_z = n * d - (n + 1) * overlap;
+  s.wall_z = n * d - (n + 1) * closed;
   return s;
 }
 void stick(Scene& s) { s.grain.mu_s = s.grain.mu_d = s.wall.mu_s = s.wall.mu_d = 1e6; }
@@ -153,25 +154,31 @@ TEST(Spectrum, NoContactsNoLimit) {
   EXPECT_DOUBLE_EQ(one_contact_step(s, two), 2 / std::sqrt(7 * k / mass(s, r)));
 }
 
-// How much a small jolt grows in 300 steps of so many critical ones. No contact opens: 1e-5 of the overlap.
+// How much a small jolt grows in 1500 steps of so many critical ones: long, because damped modes grow slowly
+// just beyond the limit; small, so that no contact opens before; and along the stack only where grains do not
+// stick, for a pressed stack without friction buckles at any step.
 double growth(Scene s, double share) {
-  State start = stack(6);
+  State start = stack(6, 1e-6);
   s.dt = share * critical_step(spectrum(s, touching(s, start)));
-  const double jolt = 1e-5 * overlap / s.dt;
+  const double jolt = 1e-14 / s.dt, sideways = s.grain.mu_s > 0 ? 0.3 * jolt : 0;
   for (int i = 0; i < 6; ++i) {
     const double sign = i % 2 ? -1 : 1;
-    start.v[i] = {0.3 * sign * jolt, 0, sign * jolt};
-    start.omega[i] = {0, jolt / r, 0};
+    start.v[i] = {sign * sideways, 0, sign * jolt};
+    start.omega[i] = {0, sideways > 0 ? jolt / r : 0, 0};
   }
-  const State now = run(*make_engine(Backend::cpu, 1), s, start, 300);
+  State now;
+  try {
+    now = run(*make_engine(Backend::cpu, 1), s, start, 1500);
+  } catch (const Error&) {  // a grain was lost
+    return std::numeric_limits<double>::infinity();
+  }
   double largest = 0;
   for (int i = 0; i < 6; ++i)
     largest = std::max({largest, length(now.v[i]) / jolt, r * length(now.omega[i]) / jolt});
   return largest;
 }
 
-// The estimate may be 0.5 % short of dt_c, so 1.02 of it is 1.015 of that or more. What grows at 1.02 stops
-// growing only when contacts open or slip, 1e5 jolts later.
+// The estimate is at most 1 % of w^2, 0.5 % of dt_c, on the safe side, so 1.02 is beyond the limit itself.
 TEST(CriticalStep, OneHoldsTheOtherBlowsUp) {
   Scene s = column();
   EXPECT_LT(growth(s, 0.98), 20);
