@@ -19,9 +19,10 @@ namespace moraine::dem {
 // What a scene uses; the rest is not compiled into its loop.
 struct Features {
   bool friction = true;    // tangential springs and torques
-  bool viscous = false;    // gamma_n or gamma_t, on grains or walls
+  bool viscous = false;    // gamma_n or gamma_t between grains
   bool softening = false;  // mu_d < mu_s
   bool ledger = true;      // dissipated energy
+  bool damped = viscous;   // gamma_n or gamma_t between grains or at walls
 };
 
 // Where two bodies stand to one another.

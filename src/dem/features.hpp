@@ -8,26 +8,39 @@ inline Features features_of(const Scene& s) {
   const auto any = [&](auto test) { return test(s.grain) || test(s.wall); };
   Features f;
   f.friction = any([](const ContactParameters& p) { return p.mu_s > 0 && (p.k_t > 0 || p.gamma_t > 0); });
-  f.viscous = any([](const ContactParameters& p) { return p.gamma_n > 0 || p.gamma_t > 0; });
+  const auto viscous = [](const ContactParameters& p) { return p.gamma_n > 0 || p.gamma_t > 0; };
+  f.viscous = viscous(s.grain), f.damped = any(viscous);
   f.softening = f.friction && any([](const ContactParameters& p) { return p.mu_d < p.mu_s; });
   f.ledger = s.ledger;
+  return f;
+}
+
+// What of it the grains' contacts with one another and those with walls need.
+constexpr Features between_grains(Features f) {
+  f.damped = f.viscous;
+  return f;
+}
+constexpr Features at_walls(Features f) {
+  f.viscous = f.damped;
   return f;
 }
 
 // Calls use.operator()<F>() with the compiled set of features that equals f.
 template <class Use>
 void with_features(const Features& f, Use&& use) {
-  const auto ledger = [&]<bool friction, bool viscous, bool softening>() {
+  const auto ledger = [&]<bool friction, bool viscous, bool damped, bool softening>() {
     if (f.ledger)
-      use.template operator()<Features{friction, viscous, softening, true}>();
+      use.template operator()<Features{friction, viscous, softening, true, damped}>();
     else
-      use.template operator()<Features{friction, viscous, softening, false}>();
+      use.template operator()<Features{friction, viscous, softening, false, damped}>();
   };
   const auto viscous = [&]<bool friction, bool softening>() {
     if (f.viscous)
-      ledger.template operator()<friction, true, softening>();
+      ledger.template operator()<friction, true, true, softening>();
+    else if (f.damped)
+      ledger.template operator()<friction, false, true, softening>();
     else
-      ledger.template operator()<friction, false, softening>();
+      ledger.template operator()<friction, false, false, softening>();
   };
   if (!f.friction)
     viscous.template operator()<false, false>();

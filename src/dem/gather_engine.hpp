@@ -106,7 +106,7 @@ struct Integrate {
     Kinematics<Triple> k{g.x, g.v, g.omega, g.rotation};
     leapfrog(k, acceleration, spin_acceleration, dt);
     g.x = k.x, g.v = k.v, g.omega = k.omega, g.rotation = k.rotation;
-    if constexpr (F.viscous) {
+    if constexpr (F.damped) {
       w.now[i] = {axpy<double>(0.5 * w.scene.dt, acceleration, g.v), 0,
                   axpy<double>(0.5 * w.scene.dt, spin_acceleration, g.omega), 0};
       if (w.scene.shear.drive == Shear::Drive::stress && w.role[i] == Role::top)
@@ -180,15 +180,15 @@ struct Forces {
       if (w.scene.top_wall.drive != TopWall::Drive::none) add_wall(i, WallName::top, sum, damping);
     }
     w.load[i] = sum;
-    if constexpr (F.viscous && F.ledger) w.damping[i] = damping;
+    if constexpr (F.damped && F.ledger) w.damping[i] = damping;
   }
 
   MORAINE_HD void add_wall(Index i, WallName wall, LoadRow& sum, LoadRow& damping) const {
-    const NowRow now = F.viscous ? w.now[i] : NowRow{};
-    const WallAction a = wall_action<F>(w.scene.wall, dt, w.control->drive, w.grain[i], now, wall,
-                                        w.wall_spring[2 * i + static_cast<int>(wall)]);
+    const NowRow now = F.damped ? w.now[i] : NowRow{};
+    const WallAction a = wall_action<at_walls(F)>(w.scene.wall, dt, w.control->drive, w.grain[i], now, wall,
+                                                  w.wall_spring[2 * i + static_cast<int>(wall)]);
     sum.add(a.f, a.torque, a.slip);
-    if constexpr (F.viscous && F.ledger) damping.add(a.f_viscous, a.torque_viscous, 0);
+    if constexpr (F.damped && F.ledger) damping.add(a.f_viscous, a.torque_viscous, 0);
     if (wall == WallName::top) w.wall_push[i] = -a.f.z, w.wall_damping[i] = -a.f_viscous.z;
   }
 };
@@ -246,9 +246,9 @@ class GatherEngine final : public Engine {
       mobilities[i] = mobility(scene, s.r[i], s.role[i]);
     }
     load_.set(loads), mobility_.set(mobilities);
-    now_.resize(features_.viscous ? n_ : 0), wall_push_.set(std::vector<double>(n_, 0));
+    now_.resize(features_.damped ? n_ : 0), wall_push_.set(std::vector<double>(n_, 0));
     wall_damping_.set(std::vector<double>(n_, 0));
-    damping_.set(std::vector<LoadRow>(features_.viscous && features_.ledger ? n_ : 0));
+    damping_.set(std::vector<LoadRow>(features_.damped && features_.ledger ? n_ : 0));
     std::vector<Spring<double>> wall_springs(2 * static_cast<std::size_t>(n_), {{0, 0, 0}, 0});
     for (const WallContact& w : s.wall_contacts)
       wall_springs[2 * static_cast<std::size_t>(w.i) + static_cast<int>(w.wall)] = {w.delta_t, w.slipping};
@@ -264,7 +264,7 @@ class GatherEngine final : public Engine {
     refresh_view();
     if (s.staggered) return;
 
-    if (features_.viscous) {
+    if (features_.damped) {
       std::vector<NowRow> now(n_);
       const std::vector<GrainRow> grains = grain_.get();
       for (Index i = 0; i < n_; ++i) now[i] = {grains[i].v, 0, grains[i].omega, 0};

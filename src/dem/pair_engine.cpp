@@ -99,8 +99,8 @@ void PairEngine::load(const Scene& scene, const State& s) {
   const std::int64_t rows = n_ + 2 * chunks;
   grain_.resize(rows), load_.resize(rows), mobility_.resize(n_), role_.resize(n_);
   const Features features = features_of(scene);
-  now_.resize(features.viscous ? rows : 0);
-  damping_.resize(features.viscous && features.ledger ? rows : 0);
+  now_.resize(features.damped ? rows : 0);
+  damping_.resize(features.damped && features.ledger ? rows : 0);
   std::fill(damping_.data(), damping_.data() + damping_.size(), LoadRow{});
 
   const std::vector<GrainRow> grains = grain_rows(scene, s);
@@ -114,7 +114,7 @@ void PairEngine::load(const Scene& scene, const State& s) {
     const double apart = k % 2 == n_ % 2 ? 0 : 0.25 * (sides_.side.x > 0 ? sides_.side.x : 1.0);
     grain_.data()[k] = {{apart, 0, 0}, -1e30, {0, 0, 0}, -1e30, {0, 0, 0}, 0, {0, 0, 0}, 0};
     load_.data()[k] = {};
-    if (features.viscous) now_.data()[k] = {};
+    if (features.damped) now_.data()[k] = {};
   }
   for (Index c = 0; c < chunks; ++c) {
     Chunk& chunk = chunks_[c];
@@ -139,7 +139,7 @@ void PairEngine::load(const Scene& scene, const State& s) {
   find_candidates();
 
   if (s.staggered) return;
-  if (features.viscous)
+  if (features.damped)
     for (Index i = 0; i < n_; ++i) now_.data()[i] = {grain_.data()[i].v, 0, grain_.data()[i].omega, 0};
   (this->*evaluate_)(0.0);
   Drive& drive = course_.drive;
@@ -321,8 +321,9 @@ void PairEngine::rebuild_near(Chunk& chunk, const Drive& drive, double near_marg
 
 template <Features F>
 void PairEngine::pair_forces(Chunk& chunk, double dt) {
-  pair_forces<F, false>(chunk.near[0], dt);
-  pair_forces<F, true>(chunk.near[1], dt);
+  constexpr Features pairs = between_grains(F);
+  pair_forces<pairs, false>(chunk.near[0], dt);
+  pair_forces<pairs, true>(chunk.near[1], dt);
 }
 
 // Turns what a group's pairs do to their grains back into rows and adds them up, or leaves j's share in its
@@ -471,10 +472,10 @@ void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt) {
   reaction = {};
   for (WallPair& w : chunk.walls) {
     const GrainRow& g = grain_.data()[w.i];
-    const NowRow now = F.viscous ? now_.data()[w.i] : NowRow{};
-    const WallAction a = wall_action<F>(scene_.wall, dt, drive, g, now, w.wall, w.spring);
+    const NowRow now = F.damped ? now_.data()[w.i] : NowRow{};
+    const WallAction a = wall_action<at_walls(F)>(scene_.wall, dt, drive, g, now, w.wall, w.spring);
     load[w.i].add(a.f, a.torque, a.slip);
-    if constexpr (F.viscous && F.ledger) damping_.data()[w.i].add(a.f_viscous, a.torque_viscous, 0);
+    if constexpr (F.damped && F.ledger) damping_.data()[w.i].add(a.f_viscous, a.torque_viscous, 0);
     if (w.wall == WallName::top) {
       reaction.wall_force -= a.f.z;
       reaction.wall_damping -= a.f_viscous.z;
@@ -482,9 +483,9 @@ void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt) {
   }
   for (const Index i : chunk.top_layer) {
     reaction.shear_force += load[i].f.x;
-    if constexpr (F.viscous && F.ledger) reaction.layer_damping += damping_.data()[i].f.x;
+    if constexpr (F.damped && F.ledger) reaction.layer_damping += damping_.data()[i].f.x;
   }
-  if constexpr (F.viscous && F.ledger) {
+  if constexpr (F.damped && F.ledger) {
     Power power;
     for (Index i = chunk.begin; i < chunk.end; ++i) {
       LoadRow& damping = damping_.data()[i];
@@ -515,7 +516,7 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive, std::int64_t step) 
     leapfrog(k, acceleration, spin_acceleration, dt);
     set_row(grain[i].x, k.x), set_row(grain[i].v, k.v), set_row(grain[i].omega, k.omega);
     set_row(grain[i].rotation, k.rotation);
-    if constexpr (F.viscous) {
+    if constexpr (F.damped) {
       set_row(now_.data()[i].v, fma(half_dt, acceleration, k.v));
       set_row(now_.data()[i].omega, fma(half_dt, spin_acceleration, k.omega));
     }
@@ -523,7 +524,7 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive, std::int64_t step) 
     fastest2 = max(k.v * k.v, fastest2);
     set_row(load.f, zero), set_row(load.torque, zero);
   }
-  if constexpr (F.viscous)
+  if constexpr (F.damped)
     if (scene_.shear.drive == Shear::Drive::stress)
       for (const Index i : chunk.top_layer) now_.data()[i].v.x = drive.layer_u_ahead;
   Chunk::Tally& tally = chunk.at(step);

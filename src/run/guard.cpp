@@ -22,8 +22,7 @@ std::string triple(const dem::Vec3d& a) {
 
 std::string when(const Stage& stage, const dem::State& s) {
   std::ostringstream text;
-  text << " at step " << s.step << " (t = " << stage.scene.time(s.step) << " s) of stage "
-       << stage.name;
+  text << " at step " << s.step << " (t = " << stage.scene.time(s.step) << " s) of stage " << stage.name;
   return text.str();
 }
 

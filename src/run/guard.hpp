@@ -33,7 +33,7 @@ class Guard {
   void check_energy(const dem::State& state);
 
   cases::Guards limits_;
-  const Stage& stage_;  // whose step may change meanwhile
+  const Stage& stage_;      // whose step may change meanwhile
   output::Row first_;       // of the stage
   double most_put_in_ = 0;  // J
 };

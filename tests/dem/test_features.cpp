@@ -32,5 +32,14 @@ TEST(Features, SofteningTakesASmallerDynamicFriction) {
   EXPECT_FALSE(of({1e7, 0, 0, 0, 0.5, 0.3}).softening);  // no friction to soften
 }
 
+// Damped walls, as in settling, leave the pairs of grains without viscous terms.
+TEST(Features, DampedWallsAreNoMatterOfPairs) {
+  const Features f = of({1e7, 1e7, 0, 0, 0.5, 0.5}, {1e7, 0, 100, 0, 0, 0});
+  EXPECT_FALSE(f.viscous);
+  EXPECT_TRUE(f.damped);
+  EXPECT_FALSE(between_grains(f).damped);
+  EXPECT_TRUE(at_walls(f).viscous);
+}
+
 }  // namespace
 }  // namespace moraine::dem
