@@ -4,6 +4,7 @@ Bed: 600 grains of Table 1 in a periodic box eight grains wide, under 80 kPa. Pr
 and mu = 0.1 (dense); then, for each setting, stiffness set, springs cleared, damped consolidation for 0.05 s at mu = 0.1, and shear
 at mu = 0.3 without damping. `paper` is f = 0.075, k_n = 1.16e9 N/m, 0.05 1/s.
 """
+import hashlib
 import json
 import math
 import shutil
@@ -92,6 +93,7 @@ full, quick = Size(600, 0.32, 7, 0.25), Size(200, 0.22, 5, 0.15)
 class Beds:
     def __init__(self, program, state, size):
         self.program, self.state, self.size = program, state, size
+        self.version = hashlib.sha256(program.read_bytes()).hexdigest()[:12]
 
     def file(self, setting, seed):
         return self.state / f"bed{self.size.grains}-{setting.name}-seed{seed}.json"
@@ -148,7 +150,7 @@ f = {setting.f!r}""")))
         if file.exists():
             return json.loads(file.read_text())
         case = self.state / f"running{self.size.grains}-{setting.name}-seed{seed}"
-        result = dict(setting._asdict(), seed=seed, grains=self.size.grains, strain=self.size.strain)
+        result = dict(setting._asdict(), seed=seed, grains=self.size.grains, strain=self.size.strain, program=self.version)
         # A bed that flies apart would search neighbours forever.
         limit = 60 + setting.steps * self.size.strain * self.size.grains * 4e-7
         try:

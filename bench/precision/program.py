@@ -1,14 +1,10 @@
 """Moraine as a program: a case written, run on one thread, and what it left read back."""
-import datetime
 import os
 import resource
 import subprocess
-from pathlib import Path
 
 import h5py
 import numpy as np
-
-root = Path(__file__).resolve().parents[2]
 
 
 class Failed(Exception):
@@ -82,12 +78,3 @@ duration = 1e-9
         state.attrs["staggered"] = np.array(0, state.attrs["staggered"].dtype)
         state.attrs["wall_z"] = wall
     return path
-
-
-def about(what, command):
-    lines = subprocess.run(["lscpu"], capture_output=True, text=True).stdout.splitlines()
-    machine = {name: value.strip() for name, _, value in (line.partition(":") for line in lines)
-               if name in ("Model name", "CPU(s)", "L3 cache")}
-    git = subprocess.run(["git", "-C", str(root), "describe", "--always", "--dirty"], capture_output=True, text=True)
-    return dict(what=what, date=datetime.date.today().isoformat(), machine=machine, version=git.stdout.strip() or "unknown",
-                command=command)
