@@ -28,7 +28,8 @@ def run(program, case, cpu_limit=None):
         out.seek(0)
         text = out.read().strip()
     if process.returncode:
-        raise Failed(text.split("\n")[-1] or f"stopped by signal {-process.returncode} (limit {cpu_limit:.0f} s of processor time)")
+        said = text.split("\n")[-1].partition("; the last good checkpoint")[0]  # what follows is a path
+        raise Failed(said or f"stopped by signal {-process.returncode} (limit {cpu_limit:.0f} s of processor time)")
     return used.ru_utime + used.ru_stime
 
 

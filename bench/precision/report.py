@@ -107,7 +107,10 @@ def plot(path, smooth, entries, about):
     left.axvline(0.075, color="0.6", lw=0.8)
     left.set(xlabel="f = dt / sqrt(min m / k), 1   (run time goes as 1/f)", ylabel="error over what happened, 1",
              title="Smooth scenes, against f = 0.075/64")
-    left.text(0.078, left.get_ylim()[0] * 1.3, "paper", color="0.4")
+    left.text(0.078, 0.93, "paper", color="0.4", transform=left.get_xaxis_transform())
+    stopped = {r["f"] for r in smooth if "failed" in r}
+    left.plot(sorted(stopped), [0.97] * len(stopped), "x", color="0.15", transform=left.get_xaxis_transform(),
+              label="some scene was stopped as unstable")
     left.legend(fontsize="small")
 
     tested = [e for e in entries if "tests" in e]
@@ -129,12 +132,12 @@ def plot(path, smooth, entries, about):
         right.axhline(see, color="0.5", ls=":", label="a single statistic's difference that the test\nfinds in 80 % of cases (median)")
         reference = next(e for e in entries if e["setting"] == paper)["cpu_s_per_strain"]
         right.axvline(reference, color="0.6", lw=0.8)
-        right.text(reference, right.get_ylim()[0], " paper", color="0.4", va="bottom")
-        right.plot([], [], "o", color="0.15", mfc="white", label="no statistic seen to differ")
-        right.plot([], [], "x", color="0.15", label="some statistic differs")
+        right.text(reference, 0.03, "paper ", color="0.4", ha="right", transform=right.get_xaxis_transform())
+        right.plot([], [], "o", color="0.15", mfc="white", label="no statistic OUTSIDE")
+        right.plot([], [], "x", color="0.15", label="some statistic OUTSIDE")
         right.set(xscale="log", yscale="log", xlabel="processor time for a unit of shear strain, s",
                   ylabel="largest difference from paper, s.d. of seeds", title="Sheared beds, statistics over seeds")
-        right.legend(fontsize="x-small")
+        right.legend(fontsize="x-small", loc="upper right")
     figure.suptitle(f"{about['machine'].get('Model name', '')}, {about['date']}, {about['version']}", fontsize=8, color="0.4")
     figure.savefig(path, dpi=130)
     plt.close(figure)
