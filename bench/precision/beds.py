@@ -130,11 +130,13 @@ clear_history = true
         run(self.program, case)
         return case
 
-    def shear(self, case, relaxed, seed, setting, extent, interval, cpu_limit=None):
+    def shear(self, case, relaxed, seed, setting, extent, interval, cpu_limit=None, dt=0.0):
         write_case(case, text(self.size, seed, setting.soft, (f'start = "{relaxed.resolve()}"', f"""\
 [output]
 series_interval = {interval!r}
 snapshot_interval = 1000
+[model]
+dt = {dt!r}
 [[stage]]
 name = "shear"
 kind = "shear"

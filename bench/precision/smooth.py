@@ -123,11 +123,12 @@ class Stretch:
 
     def state(self, f):
         case = self.directory / "run"
-        self.beds.shear(case, self.relaxed, 1, Setting(f=f), f"duration = {self.duration!r}", 1.0, 120)
+        steps = round(self.duration / (f * math.sqrt(mass / k_paper)))  # whole steps: all end at the same time
+        self.beds.shear(case, self.relaxed, 1, Setting(f=f), f"duration = {self.duration!r}", 1.0, 120, self.duration / steps)
         grains, _ = last_snapshot(case)
         free = grains["role"] == 0
         q = np.hstack([grains["displacement"], radius * grains["rotation"]])[free]
-        return q, round(self.duration / (f * math.sqrt(mass / k_paper)))
+        return q, steps
 
 
 def errors(program, directory, size, factors, softenings, f_soft=0.075):
