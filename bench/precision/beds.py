@@ -77,7 +77,8 @@ mass = {6.4e-4 * size.grains!r}
 def damped(soft):
     """A tenth of critical damping, for grains and walls."""
     gamma = 0.2 * math.sqrt(mass * k_paper / soft)
-    return f"gamma_n = {gamma!r}\ngamma_t = {gamma!r}\nwall_gamma_n = {gamma!r}\nwall_gamma_t = {gamma!r}\nmu_s = 0.1\nmu_d = 0.1\nf = 0.075\n"
+    viscosities = "".join(f"{key} = {gamma!r}\n" for key in ("gamma_n", "gamma_t", "wall_gamma_n", "wall_gamma_t"))
+    return viscosities + "mu_s = 0.1\nmu_d = 0.1\nf = 0.075\n"
 
 
 class Size(NamedTuple):
