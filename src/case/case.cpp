@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "case/keys.hpp"
+#include "case/preset.hpp"
 #include "case/read.hpp"
 #include "error.hpp"
 
@@ -175,6 +176,7 @@ string text_of(const Draft& draft) {
 
 Case load(const fs::path& directory, const std::vector<Override>& overrides) {
   Draft draft = read(directory, overrides);
+  apply_preset(draft);
   const string file = (directory / "case.toml").string();
   Case c{};
   Stage no_stage{};
@@ -186,6 +188,7 @@ Case load(const fs::path& directory, const std::vector<Override>& overrides) {
     add_default(key, draft.entries, context);
     if (key.set) key.set(key, c, no_stage, draft.entries.at(key.name).value);
   }
+  for (double* k : {&c.k_n, &c.k_t, &c.wall_k_t}) *k /= c.softening;
   check_case(draft.entries);
   c.start = start_file(directory, draft.entries.at("start"));
 

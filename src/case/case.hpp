@@ -73,6 +73,8 @@ struct Case {
   bool periodic_x, periodic_y, periodic_z;
   bool floor;
   Grains grains;
+  std::string preset;       // "none", or what filled f and softening
+  double softening;         // what the stiffnesses below have been divided by
   double k_n, k_t;          // N/m
   double wall_k_t;          // N/m
   double wall_mass;         // kg; 0: 0.001 of the mass of N spheres as wide as a lattice cell

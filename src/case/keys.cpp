@@ -7,6 +7,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "case/preset.hpp"
 #include "error.hpp"
 
 namespace moraine::cases {
@@ -114,6 +115,8 @@ std::vector<Key> make_keys() {
       row<&C::wall_mass>("wall.mass", "kg", "0", ">= 0", "of the top wall; 0: 0.001 of the mass of N spheres as wide as a lattice cell"),
 
       row<&C::gravity>("model.gravity", "m/s2", "9.80665", ">= 0", "along -z"),
+      row<&C::preset>("model.preset", "", "\"none\"", "none | paper | standard | fast", "accuracy against time: sets f and softening where the case does not; see below"),
+      row<&C::softening>("model.softening", "1", "1", ">= 1", "k_n and k_t of grains and walls are divided by it; viscosities are not"),
       {"model.f", Type::number, "1", "0.075", "> 0", "time step in units of sqrt(min m / max(k_n, k_t)), eq. 9; a stage may have its own", "", set_nothing},
       {"model.dt", Type::number, "s", "0", ">= 0 | auto", "time step; 0: by f; \"auto\": safety times the critical step of the present contact network", "", set_dt},
       row<&C::safety>("model.safety", "1", "0.5", "0.01 .. 1", "dt = \"auto\": share of the critical step"),
@@ -306,7 +309,7 @@ string reference() {
            key.meaning + (key.accepts.empty() ? "" : " (" + key.accepts + ")") +
            (key.kinds.empty() ? "" : " [" + key.kinds + "]") + "\n";
   }
-  return out;
+  return out + preset_reference();
 }
 
 }  // namespace moraine::cases

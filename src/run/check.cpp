@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <iostream>
 
+#include "case/keys.hpp"
 #include "dem/spectrum.hpp"
 #include "run/precheck.hpp"
 #include "run/progress.hpp"
@@ -51,6 +52,13 @@ void check_case(const Options& options) {
   // Records, rotation, mobility, some 3.5 candidates and near pairs a grain with springs, and the state kept
   // for output.
   std::printf("  memory        about %.0f MB\n", n * 2200 / 1e6 + 20);
+
+  if (c.preset != "none" || c.softening != 1) {
+    std::string f;
+    for (const cases::Stage& stage : c.stages) f += cases::to_toml(stage.f) + " ";
+    std::printf("  preset        %s: f of the stages %s; stiffness divided by %g: k_n = %.4g N/m\n",
+                c.preset.c_str(), f.c_str(), c.softening, c.k_n);
+  }
 
   double total = 0, ms = 0;
   for (std::size_t k = 0; k < c.stages.size(); ++k) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "case/keys.hpp"
+#include "case/preset.hpp"
 #include "error.hpp"
 #include "temporary_directory.hpp"
 
@@ -198,6 +199,50 @@ TEST_F(CaseTest, resolved_loads_to_the_same_case) {
   EXPECT_NE(c.resolved.find("normal_stress = 80000.0  # Pa\n"), c.resolved.npos);
   write(c.resolved);
   EXPECT_TRUE(load() == c);
+}
+
+TEST_F(CaseTest, a_preset_sets_step_and_stiffness) {
+  const std::string contact = "[contact]\nk_n = 3e8\nk_t = 2e8\n[wall]\nk_t = 1e8\n";
+  const auto with = [&](const std::string& model) {
+    write(contact + "[model]\n" + model + "\n" + settle + shear + "f = 0.01\n");
+    return load();
+  };
+  const Case plain = with("");
+  EXPECT_EQ(plain.preset, "none");
+  EXPECT_EQ(plain.softening, 1);
+  EXPECT_EQ(plain.k_n, 3e8);
+  EXPECT_EQ(plain.stages[0].f, 0.075);
+  for (const Preset& p : presets()) {
+    const Case c = with("preset = \"" + p.name + "\"");
+    EXPECT_EQ(c.k_n, 3e8 / p.softening);
+    EXPECT_EQ(c.k_t, 2e8 / p.softening);
+    EXPECT_EQ(c.wall_k_t, 1e8 / p.softening);
+    EXPECT_EQ(c.stages[0].f, p.f);
+    EXPECT_EQ(c.stages[1].f, 0.01);  // a stage's own f stays
+    EXPECT_NE(reference().find(p.evidence), std::string::npos);
+  }
+  const Case paper = with("preset = \"paper\"");
+  EXPECT_EQ(paper.k_n, plain.k_n);
+  EXPECT_EQ(paper.stages, plain.stages);
+}
+
+TEST_F(CaseTest, explicit_keys_override_a_preset) {
+  write("[model]\npreset = \"fast\"\nsoftening = 2\nf = 0.05\n" + settle);
+  EXPECT_EQ(load().k_n, 1.16e9 / 2);
+  EXPECT_EQ(load().stages[0].f, 0.05);
+  EXPECT_EQ(load({{"model.softening", "4"}}).k_n, 1.16e9 / 4);
+  write("[model]\npreset = \"fast\"\n" + settle, "base");
+  write("extends = \"../base\"\n[model]\npreset = \"paper\"\n");
+  EXPECT_EQ(load().k_n, 1.16e9);
+}
+
+TEST_F(CaseTest, a_resolved_preset_softens_once) {
+  write("[model]\npreset = \"fast\"\n" + settle);
+  const Case c = load();
+  write(c.resolved, "again");
+  Case again = load({}, "again");
+  again.directory = c.directory;
+  EXPECT_EQ(again, c);
 }
 
 TEST_F(CaseTest, every_key_is_in_the_reference) {
