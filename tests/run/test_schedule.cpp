@@ -30,7 +30,7 @@ class Schedule : public Program {
 // last two of a stage stand a few steps apart.
 TEST_F(Schedule, RecordsAtTimes) {
   const auto fixed = make("fixed", small_case());
-  ASSERT_NO_FATAL_FAILURE(run(fixed, {"model.dt=1.37e-4", "guards.max_overlap=0.5"}));  // soft grains
+  ASSERT_NO_FATAL_FAILURE(run(fixed, {"model.dt=1.37e-4", "guards.max_overlap=2"}));  // held layers meet
   expect_times(fixed, 0.5 * 1.37e-4 * 1.001);
 }
 
@@ -76,7 +76,13 @@ TEST_F(Schedule, CheckPrintsTheCriticalStep) {
   const auto again = make("again", "start = \"../bed\"\n" + small_case());
   Outcome o = moraine({"check", again.string(), "--set", "model.dt=auto"});
   EXPECT_NE(o.out.find("critical"), std::string::npos) << o.out;
-  EXPECT_NE(o.out.find("0.5 of it"), std::string::npos) << o.out;
+  const std::string before = "the step is ";
+  const auto at = o.out.find(before);
+  ASSERT_NE(at, std::string::npos) << o.out;
+  const double share =
+      std::stod(o.out.substr(at + before.size()));  // fitted to the next record: not above 0.5
+  EXPECT_LE(share, 0.5);
+  EXPECT_GT(share, 0.4);
   EXPECT_EQ(o.out.find("blow up"), std::string::npos) << o.out;
   o = moraine({"check", again.string(), "--set", "model.dt=2e-3"});
   EXPECT_NE(o.out.find("blow up"), std::string::npos) << o.out;
