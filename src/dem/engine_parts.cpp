@@ -39,7 +39,8 @@ std::vector<GrainRow> grain_rows(const Scene& scene, const State& s) {
   std::vector<GrainRow> rows(s.size());
   for (Index i = 0; i < s.size(); ++i) {
     GrainRow& g = rows[i];
-    g = {s.x[i], s.r[i], s.v[i], s.r[i], s.omega[i], 0, s.rotation[i], 0};
+    const Mobility m = mobility(scene, s.r[i], s.role[i]);
+    g = {s.x[i], s.r[i], s.v[i], s.r[i], s.omega[i], m.inverse_mass_z, s.rotation[i], m.inverse_inertia};
     if (s.role[i] == Role::free) continue;
     const double u = s.role[i] == Role::bottom                     ? 0
                      : scene.shear.drive == Shear::Drive::velocity ? scene.shear.velocity
@@ -78,9 +79,10 @@ Error lost_grain(const Scene& scene, const Drive& drive, const GrainRow& g, Inde
   return error(place.str(), "passed through the top wall (at ", drive.wall_z, " m)", remedy);
 }
 
-void half_step_back(GrainRow& g, const Mobility& m, const Vec3d& f, const Vec3d& torque, double dt) {
-  g.v = axpy(-0.5 * dt, m.acceleration(f), g.v);
-  g.omega = axpy(-0.5 * dt, m.spin_acceleration(torque), g.omega);
+void half_step_back(const Scene& scene, GrainRow& g, const LoadRow& load) {
+  const Mobility m = mobility(scene, g);
+  g.v = axpy(-0.5 * scene.dt, m.acceleration(load.f), g.v);
+  g.omega = axpy(-0.5 * scene.dt, m.spin_acceleration(load.torque), g.omega);
 }
 
 void append_grain(State& s, const GrainRow& g, const LoadRow& load, Role role) {

@@ -46,8 +46,9 @@ MORAINE_HD WallAction wall_action(const ContactParameters& law, double dt, const
 
 // The forces of viscous contacts on a grain do this much work at step n, when its velocity is half a step
 // further.
-MORAINE_HD void add_damping_power(Power& power, const GrainRow& g, const Mobility& m, const LoadRow& load,
+MORAINE_HD void add_damping_power(Power& power, const Scene& scene, const GrainRow& g, const LoadRow& load,
                                   const LoadRow& damping, double dt) {
+  const Mobility m = mobility(scene, g);
   power.add(damping, axpy(0.5 * dt, m.acceleration(load.f), g.v),
             axpy(0.5 * dt, m.spin_acceleration(load.torque), g.omega));
 }
@@ -61,8 +62,7 @@ MORAINE_HD bool is_lost(const Scene& scene, const Drive& drive, const GrainRow& 
 }
 Error lost_grain(const Scene& scene, const Drive& drive, const GrainRow& g, Index id);
 
-void half_step_back(GrainRow& grain, const Mobility& mobility, const Vec3d& f, const Vec3d& torque,
-                    double dt);
+void half_step_back(const Scene& scene, GrainRow& grain, const LoadRow& load);
 
 void append_grain(State& s, const GrainRow& grain, const LoadRow& load, Role role);
 // Only if they touch.

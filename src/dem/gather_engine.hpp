@@ -31,7 +31,6 @@ struct GatherView {
   NowRow* now;
   LoadRow *load, *damping;           // damping: the viscous part, where the ledger asks for it
   double *wall_push, *wall_damping;  // N, each grain's force on the top wall; its viscous part
-  const Mobility* mobility;
   const Role* role;
   const std::int64_t* row;
   const Index* neighbour;
@@ -63,7 +62,7 @@ struct SumChunk {
         if (w.damping) reaction.layer_damping += w.damping[i].f.x;
       }
       slip += w.load[i].slip;
-      if (w.damping) add_damping_power(power, w.grain[i], w.mobility[i], w.load[i], w.damping[i], dt);
+      if (w.damping) add_damping_power(power, w.scene, w.grain[i], w.load[i], w.damping[i], dt);
     }
     reaction.damping_power = power.total();
     w.reaction[c] = reaction, w.slip[c] = slip;
@@ -101,8 +100,9 @@ struct Integrate {
     if (w.scene.shear.drive == Shear::Drive::stress && w.role[i] == Role::top)
       g.v.x = w.control->drive.layer_u;
     const Triple dt(Vec3d{w.scene.dt, w.scene.dt, w.scene.dt});
-    const Triple acceleration = w.mobility[i].acceleration(w.load[i].f);
-    const Triple spin_acceleration = w.mobility[i].spin_acceleration(w.load[i].torque);
+    const Mobility m = mobility(w.scene, g);
+    const Triple acceleration = m.acceleration(w.load[i].f);
+    const Triple spin_acceleration = m.spin_acceleration(w.load[i].torque);
     Kinematics<Triple> k{g.x, g.v, g.omega, g.rotation};
     leapfrog(k, acceleration, spin_acceleration, dt);
     g.x = k.x, g.v = k.v, g.omega = k.omega, g.rotation = k.rotation;
@@ -240,12 +240,8 @@ class GatherEngine final : public Engine {
     grain_.set(grain_rows(scene, s));
     role_.set(s.role);
     std::vector<LoadRow> loads(n_);
-    std::vector<Mobility> mobilities(n_);
-    for (Index i = 0; i < n_; ++i) {
-      loads[i] = {s.force[i], 0, s.torque[i], 0};
-      mobilities[i] = mobility(scene, s.r[i], s.role[i]);
-    }
-    load_.set(loads), mobility_.set(mobilities);
+    for (Index i = 0; i < n_; ++i) loads[i] = {s.force[i], 0, s.torque[i], 0};
+    load_.set(loads);
     now_.resize(features_.damped ? n_ : 0), wall_push_.set(std::vector<double>(n_, 0));
     wall_damping_.set(std::vector<double>(n_, 0));
     damping_.set(std::vector<LoadRow>(features_.damped && features_.ledger ? n_ : 0));
@@ -333,7 +329,6 @@ class GatherEngine final : public Engine {
     view_.grain = grain_.data(), view_.now = now_.data(), view_.load = load_.data();
     view_.damping = damping_.size() > 0 ? damping_.data() : nullptr;
     view_.wall_push = wall_push_.data(), view_.wall_damping = wall_damping_.data();
-    view_.mobility = mobility_.data();
     view_.role = role_.data(), view_.row = lists_.row.data(), view_.neighbour = lists_.neighbour.data();
     view_.spring = spring_.data(), view_.wall_spring = wall_spring_.data(), view_.reaction = reaction_.data();
     view_.slip = slip_.data(), view_.fastest2 = fastest2_.data(), view_.control = control_.data();
@@ -381,8 +376,7 @@ class GatherEngine final : public Engine {
     std::vector<GrainRow> grains = grain_.get();
     std::vector<LoadRow> loads = load_.get();
     for (Index i = 0; i < n_; ++i) {
-      half_step_back(grains[i], mobility(view_.scene, grains[i].r, role_host_[i]), loads[i].f,
-                     loads[i].torque, view_.scene.dt);
+      half_step_back(view_.scene, grains[i], loads[i]);
       loads[i].slip = 0;
     }
     grain_.set(grains), load_.set(loads), control_.set({control});
@@ -429,7 +423,6 @@ class GatherEngine final : public Engine {
   Array<NowRow> now_;
   Array<LoadRow> load_, damping_;
   Array<double> wall_push_, wall_damping_, fastest2_;
-  Array<Mobility> mobility_;
   Array<Role> role_;
   Array<Spring<double>> spring_, old_spring_, wall_spring_;
   Array<Reaction> reaction_;

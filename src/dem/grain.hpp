@@ -12,11 +12,11 @@ struct alignas(64) GrainRow {
   Vec3d x;
   double r;
   Vec3d v;
-  double r_again;  // so that one row difference gives v_i - v_j and another row sum r_i + r_j
+  double r_again;  // so that one line gives r_i - r_j and r_i + r_j beside x_ij and v_ij
   Vec3d omega;
-  double unused_omega;
-  Vec3d rotation;  // rad, integral of omega
-  double unused_rotation;
+  double inverse_mass;     // 1/kg; see Mobility (leapfrog.hpp)
+  Vec3d rotation;          // rad, integral of omega
+  double inverse_inertia;  // 1/(kg m2); 0 for a held grain
 };
 
 // Velocities at step n, needed by viscous contacts only.

@@ -15,7 +15,7 @@ struct Triple : Vec3d {
 
 // How a grain answers to forces. Held grains (par. 26) do not move along held directions, do not spin, feel
 // no gravity.
-struct alignas(32) Mobility {
+struct Mobility {
   double inverse_mass_xy, inverse_mass_z;  // 1/kg
   double gravity;                          // m/s2, along z
   double inverse_inertia;                  // 1/(kg m2)
@@ -31,6 +31,11 @@ MORAINE_HD Mobility mobility(const Scene& scene, double r, Role role) {
   const double m = sphere_mass(scene.density, r);
   if (role == Role::free) return {1 / m, 1 / m, -scene.gravity, 1 / (0.4 * m * r * r)};
   return {0, scene.shear.hold_z ? 0 : 1 / m, 0, 0};
+}
+// The same from a grain's row, which says by its inverse_inertia whether the grain is free.
+MORAINE_HD Mobility mobility(const Scene& scene, const GrainRow& g) {
+  const bool free = g.inverse_inertia > 0;
+  return {free ? g.inverse_mass : 0, g.inverse_mass, free ? -scene.gravity : 0, g.inverse_inertia};
 }
 
 template <class Row>

@@ -10,15 +10,44 @@ namespace moraine::dem {
 
 namespace {
 
-// 21 bits, two zeros between each.
-std::uint64_t spread(std::uint64_t v) {
-  v &= 0x1fffff;
-  v = (v | v << 32) & 0x1f00000000ffff;
-  v = (v | v << 16) & 0x1f0000ff0000ff;
-  v = (v | v << 8) & 0x100f00f00f00f00f;
-  v = (v | v << 4) & 0x10c30c30c30c30c3;
-  return (v | v << 2) & 0x1249249249249249;
-}
+constexpr Index leaf = 4;  // grains that are close enough in any order
+
+class Halving {
+ public:
+  Halving(const Sides& sides, const State& state) : sides_(sides), state_(state) {}
+
+  // Orders the grains [begin, end) of the list.
+  void operator()(Index* begin, Index* end, Index chunk) const {
+    const auto n = static_cast<Index>(end - begin);
+    if (n <= leaf) return;
+    const Index whole = n > chunk ? (n / 2 + chunk / 2) / chunk * chunk : n / 2;
+    Index* const middle = begin + std::clamp<Index>(whole, 1, n - 1);
+    const int axis = longest(begin, end);
+    std::nth_element(begin, middle, end, [&](Index a, Index b) {
+      return std::tie(state_.x[a][axis], state_.id[a]) < std::tie(state_.x[b][axis], state_.id[b]);
+    });
+    (*this)(begin, middle, chunk), (*this)(middle, end, chunk);
+  }
+
+ private:
+  // A cut across a periodic side has two faces while the part goes all the way round.
+  int longest(const Index* begin, const Index* end) const {
+    int axis = 0;
+    double most = -1;
+    for (int a = 0; a < 3; ++a) {
+      double low = state_.x[*begin][a], high = low;
+      for (const Index* i = begin; i != end; ++i)
+        low = std::min(low, state_.x[*i][a]), high = std::max(high, state_.x[*i][a]);
+      double length = high - low;
+      if (length > 0.9 * sides_.side[a] && sides_.side[a] > 0) length *= 0.5;
+      if (length > most) axis = a, most = length;
+    }
+    return axis;
+  }
+
+  const Sides& sides_;
+  const State& state_;
+};
 
 }  // namespace
 
@@ -32,23 +61,10 @@ void sort_spatially(const Scene& scene, State& s) {
         s.x[i][a] -= shift, s.x_start[i][a] -= shift;
       }
 
-  Vec3d low = s.x[0];
-  double r_max = 0;
-  for (Index i = 0; i < n; ++i) {
-    for (int a = 0; a < 3; ++a) low[a] = std::min(low[a], s.x[i][a]);
-    r_max = std::max(r_max, s.r[i]);
-  }
-  std::vector<std::uint64_t> key(n);
-  for (Index i = 0; i < n; ++i) {
-    const auto cell = [&](int a) {
-      return static_cast<std::uint64_t>(std::min((s.x[i][a] - low[a]) / r_max, 2097151.0));
-    };
-    key[i] = spread(cell(0)) | spread(cell(1)) << 1 | spread(cell(2)) << 2;
-  }
   std::vector<Index> order(n), place(n);
   std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(),
-            [&](Index a, Index b) { return std::tie(key[a], s.id[a]) < std::tie(key[b], s.id[b]); });
+  std::sort(order.begin(), order.end(), [&](Index a, Index b) { return s.id[a] < s.id[b]; });
+  Halving{sides, s}(order.data(), order.data() + n, chunk_size(n));
   for (Index k = 0; k < n; ++k) place[order[k]] = k;
 
   const auto permute = [&](auto& v) {

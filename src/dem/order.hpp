@@ -5,7 +5,8 @@
 
 namespace moraine::dem {
 
-// Wraps positions into the box along periodic sides, sorts the grains along a space-filling curve, and takes
+// Wraps positions into the box along periodic sides, sorts the grains by halving the bed again and again
+// across its longest side (first at the ends of chunks, grain.hpp, so that these are blocks), and takes
 // contacts along (their springs turn round where i and j change places). Ties go by id, so the result depends
 // on the state alone.
 void sort_spatially(const Scene& scene, State& state);

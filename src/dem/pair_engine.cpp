@@ -13,61 +13,77 @@ namespace moraine::dem {
 namespace {
 
 constexpr Index no_link = -1;
-constexpr int group_block = 16;  // groups of four that go through the three phases together
+constexpr int block_pairs = 64;  // that go through the phases together
+constexpr int rows_ahead = 8;
+// A chunk costs as much to bring into another core's cache as to compute, so it changes hands only where its
+// thread is held up for longer than that.
+constexpr int turns_before_help = 1000;
 constexpr int steps_between_checks = 256;
 constexpr int steps_near_list_should_last = 80;
 
-template <class Row>
-Pack row(const Row& v) {
-  return Pack::load(reinterpret_cast<const double*>(&v));
+// A vector and the number behind it.
+using Row = Simd<4>;
+template <class Member>
+Row row(const Member& v) {
+  return Row::load(reinterpret_cast<const double*>(&v));
 }
-template <class Row>
-void set_row(Row& v, Pack p) {
+template <class Member>
+void set_row(Member& v, Row p) {
   p.store(reinterpret_cast<double*>(&v));
 }
+// All of a LoadRow, or the first half of a GrainRow.
+template <class Struct>
+Line line(const Struct& s) {
+  return Line::load(reinterpret_cast<const double*>(&s));
+}
+template <class Member>
+const double* numbers(const Member& m) {
+  return reinterpret_cast<const double*>(&m);
+}
+
+void clear(Host::Array<LoadRow>& loads) { std::fill(loads.data(), loads.data() + loads.size(), LoadRow{}); }
 
 }  // namespace
 
-void PairEngine::PairList::add(Index i, Index j, Index target, const Spring<double>& s) {
-  const auto lane = static_cast<int>(count % 4);
+Index PairEngine::PairList::add(Index i, Index j, Index target, bool across, const Spring<double>& s) {
+  const int lane = count % lanes;
   if (lane == 0) {
     pairs.emplace_back();
-    springs.push_back({0.0, 0.0, 0.0});
-    slipping.push_back(0.0);
+    springs.emplace_back();
+    slipping.emplace_back();
+    across_sides.push_back(false);
   }
   PairGroup& p = pairs.back();
   p.i[lane] = row_bytes * i, p.j[lane] = row_bytes * j, p.target[lane] = row_bytes * target;
   for (int a = 0; a < 3; ++a) springs.back()[a].v[lane] = s.delta_t[a];
   slipping.back().v[lane] = s.slipping;
-  ++count;
+  if (across) across_sides.back() = true;
+  return count++;
 }
 
-void PairEngine::PairList::pad(Index first_dummy) {
-  if (count % 4 == 0) return;
-  for (auto lane = static_cast<int>(count % 4); lane < 4; ++lane) {
-    pairs.back().i[lane] = row_bytes * first_dummy;
-    pairs.back().j[lane] = pairs.back().target[lane] = row_bytes * (first_dummy + 1);
-  }
+void PairEngine::PairList::pad(Index i, Index far_away, Index target) {
+  while (count % lanes != 0) add(i, far_away, target, false, {{0, 0, 0}, 0});
 }
 
-Spring<double> PairEngine::PairList::spring(std::int64_t k) const {
-  const Vec3<Pack>& s = springs[k / 4];
-  const int lane = static_cast<int>(k % 4);
-  return {{s.x[lane], s.y[lane], s.z[lane]}, slipping[k / 4][lane]};
+Spring<double> PairEngine::PairList::spring(Index place) const {
+  const Vec3<Pack>& s = springs[place / lanes];
+  const int lane = static_cast<int>(place % lanes);
+  return {{s.x[lane], s.y[lane], s.z[lane]}, slipping[place / lanes][lane]};
 }
 
 PairEngine::PairEngine(int threads) : threads_wanted_(threads) { space_.threads = std::max(1, threads); }
 
 std::string PairEngine::describe() const {
-#if defined(__AVX2__)
-  const char* lanes = "AVX2";
+#if defined(__AVX512F__)
+  const char* set = "AVX-512";
+#elif defined(__AVX2__)
+  const char* set = "AVX2";
 #elif defined(__x86_64__)
-  const char* lanes = "SSE2";
+  const char* set = "SSE2";
 #else
-  const char* lanes = "portable SIMD";
+  const char* set = "portable SIMD";
 #endif
-  return "cpu, " + std::to_string(space_.threads) + (space_.threads == 1 ? " thread, " : " threads, ") +
-         lanes;
+  return "cpu, " + std::to_string(space_.threads) + (space_.threads == 1 ? " thread, " : " threads, ") + set;
 }
 
 Engine::Counts PairEngine::counts() const {
@@ -96,37 +112,31 @@ void PairEngine::load(const Scene& scene, const State& s) {
   chunks_.clear();
   chunks_.resize(chunks);
   progress_ = std::make_unique<Progress[]>(chunks);
-  const std::int64_t rows = n_ + 2 * chunks;
-  grain_.resize(rows), load_.resize(rows), mobility_.resize(n_), role_.resize(n_);
+  grain_.resize(n_ + 1), load_.resize(n_), role_.resize(n_);
   const Features features = features_of(scene);
-  now_.resize(features.damped ? rows : 0);
-  damping_.resize(features.damped && features.ledger ? rows : 0);
-  std::fill(damping_.data(), damping_.data() + damping_.size(), LoadRow{});
+  now_.resize(features.damped ? n_ + 1 : 0);
+  damping_.resize(features.damped && features.ledger ? n_ : 0);
+  clear(damping_);
+  buffers_.clear();
+  buffers_.resize(space_.threads);
 
   const std::vector<GrainRow> grains = grain_rows(scene, s);
   std::copy(grains.begin(), grains.end(), grain_.data());
   for (Index i = 0; i < n_; ++i) {
     role_.data()[i] = s.role[i];
-    mobility_.data()[i] = mobility(scene, s.r[i], s.role[i]);
     load_.data()[i] = {s.force[i], 0, s.torque[i], 0};
   }
-  for (std::int64_t k = n_; k < rows; ++k) {  // dummies: pairs that never touch
-    const double apart = k % 2 == n_ % 2 ? 0 : 0.25 * (sides_.side.x > 0 ? sides_.side.x : 1.0);
-    grain_.data()[k] = {{apart, 0, 0}, -1e30, {0, 0, 0}, -1e30, {0, 0, 0}, 0, {0, 0, 0}, 0};
-    load_.data()[k] = {};
-    if (features.damped) now_.data()[k] = {};
-  }
+  // One grain that never touches, for the last lanes of a list; at no round place, lest a grain be there.
+  grain_.data()[n_] = {
+      {-987654321.12, -876543210.98, -765432109.87}, -1e9, {0, 0, 0}, -1e9, {0, 0, 0}, 0, {0, 0, 0}, 0};
+  if (features.damped) now_.data()[n_] = {};
   for (Index c = 0; c < chunks; ++c) {
     Chunk& chunk = chunks_[c];
     chunk.begin = c * chunk_size_, chunk.end = std::min(n_, chunk.begin + chunk_size_);
     for (Index i = chunk.begin; i < chunk.end; ++i)
       if (s.role[i] == Role::top) chunk.top_layer.push_back(i);
   }
-  for (const Contact& contact : s.contacts) {
-    Chunk& chunk = chunks_[contact.i / chunk_size_];
-    chunk.near[contact.j < chunk.end ? 0 : 1].add(contact.i, contact.j, contact.j,
-                                                  {contact.delta_t, contact.slipping});
-  }
+  place_contacts(s.contacts);
   for (const WallContact& w : s.wall_contacts)
     chunks_[w.i / chunk_size_].walls.push_back({w.i, w.wall, {w.delta_t, w.slipping}});
 
@@ -150,10 +160,21 @@ void PairEngine::load(const Scene& scene, const State& s) {
   drive.ledger = {};
   drive.ledger.viscous_power = drive.viscous_power();
   for (Index i = 0; i < n_; ++i) {
-    LoadRow& l = load_.data()[i];
-    half_step_back(grain_.data()[i], mobility_.data()[i], l.f, l.torque, scene.dt);
-    l.slip = 0;
+    half_step_back(scene, grain_.data()[i], load_.data()[i]);
+    load_.data()[i].slip = 0;
   }
+}
+
+// As near pairs, from which find_candidates takes their springs.
+void PairEngine::place_contacts(const std::vector<Contact>& contacts) {  // sorted
+  auto contact = contacts.begin();
+  for (Chunk& chunk : chunks_)
+    for (; contact != contacts.end() && contact->i < chunk.end; ++contact) {
+      const auto& [i, j, delta_t, slipping] = *contact;
+      const int part = j < chunk.end ? 0 : 1;
+      const Index place = chunk.near[part].add(i, j, 0, false, {delta_t, slipping});
+      chunk.candidates[part].push_back({i, j, no_link, place});
+    }
 }
 
 template <Features F>
@@ -169,16 +190,23 @@ void PairEngine::find_candidates() {
 
   std::vector<Index> link_of(chunks_.size(), no_link);  // from the chunk at hand to each other
   links_.clear();
-  for (Chunk& chunk : chunks_) {
-    chunk.candidates[0].clear(), chunk.candidates[1].clear(), chunk.incoming.clear(), chunk.outgoing.clear();
-  }
+  for (Chunk& chunk : chunks_) chunk.incoming.clear(), chunk.outgoing.clear();
   for (Index c = 0; c < static_cast<Index>(chunks_.size()); ++c) {
     Chunk& chunk = chunks_[c];
+    std::vector<Candidate> old[2];
+    std::swap(old[0], chunk.candidates[0]), std::swap(old[1], chunk.candidates[1]);
+    std::size_t known[2] = {0, 0};  // all lists are sorted by (i, j)
+    const auto place_of = [&](int part, Index i, Index j) {
+      std::size_t& k = known[part];
+      while (k < old[part].size() && std::tie(old[part][k].i, old[part][k].j) < std::tie(i, j)) ++k;
+      return k < old[part].size() && old[part][k].i == i && old[part][k].j == j ? old[part][k].place
+                                                                                : not_near;
+    };
     for (Index i = chunk.begin; i < chunk.end; ++i) {
       for (std::int64_t k = neighbours_.row.data()[i]; k < neighbours_.row.data()[i + 1]; ++k) {
         const Index j = neighbours_.neighbour.data()[k];
         if (j < chunk.end) {
-          chunk.candidates[0].push_back({i, j, no_link});
+          chunk.candidates[0].push_back({i, j, no_link, place_of(0, i, j)});
           continue;
         }
         const Index to = j / chunk_size_;
@@ -189,31 +217,25 @@ void PairEngine::find_candidates() {
           chunks_[to].incoming.push_back(link_of[to]);
         }
         ++links_[link_of[to]].size;
-        chunk.candidates[1].push_back({i, j, link_of[to]});
+        chunk.candidates[1].push_back({i, j, link_of[to], place_of(1, i, j)});
       }
     }
     for (const Index l : chunk.outgoing) link_of[links_[l].to] = no_link;
   }
-  const Index rows = n_ + 2 * static_cast<Index>(chunks_.size());
-  std::int64_t slots = 0;
+  std::int64_t slots = 1;  // the first one is for pads
   for (Link& link : links_) {
-    link.first = static_cast<Index>(rows + slots);
+    link.first = static_cast<Index>(slots);
     slots += link.size;
   }
-  if ((rows + slots) * row_bytes > std::numeric_limits<Offset>::max())
+  if (std::max<std::int64_t>(n_ + 1, slots) * row_bytes > std::numeric_limits<Offset>::max())
     throw error("too many grains for one process: ", n_, " grains and ", slots,
-                " pairs across chunks; there is room for 67 million in all");
-  for (Host::Array<LoadRow>* loads : {&load_, &damping_}) {
-    if (loads->size() == 0) continue;
-    if (rows + slots > loads->size()) {  // keep what grains and dummies have
-      Host::Array<LoadRow> larger;
-      larger.resize(rows + slots);
-      std::copy(loads->data(), loads->data() + rows, larger.data());
-      *loads = std::move(larger);
-    }
-    std::fill(loads->data() + rows, loads->data() + rows + slots, LoadRow{});
+                " pairs across chunks; there is room for 67 million of each");
+  slot_.resize(slots), slot_owner_.resize(slots);
+  clear(slot_);
+  if (damping_.size() > 0) {
+    damping_slot_.resize(slots);
+    clear(damping_slot_);
   }
-  slot_owner_.resize(slots);
 
   course_.moved = course_.moved_near = 0;
   course_.near_margin = choose_near_margin(fastest(course_.drive), 0);
@@ -268,38 +290,29 @@ double PairEngine::pending_slip() const {
 }
 
 void PairEngine::rebuild_near(Chunk& chunk, const Drive& drive, double near_margin) {
-  const Index dummy = n_ + 2 * static_cast<Index>(&chunk - chunks_.data());
   const GrainRow* const grain = grain_.data();
   for (const Index l : chunk.outgoing) links_[l].used = 0;
   for (int part = 0; part < 2; ++part) {
     PairList& old = chunk.near[part];
     PairList& list = chunk.spare;
     list.clear();
-    std::int64_t k = 0;  // both lists are sorted by (i, j), so the springs are found by walking along
-    for (const Candidate& c : chunk.candidates[part]) {
+    for (Candidate& c : chunk.candidates[part]) {
       const Vec3d plain = grain[c.i].x - grain[c.j].x, d = nearest_image(sides_, plain);
       const double reach = grain[c.i].r + grain[c.j].r + near_margin;
-      if (dot(d, d) >= reach * reach) continue;
-      const auto earlier = [&](std::int64_t q) {
-        const PairGroup& g = old.pairs[q / 4];
-        const Index i = g.first(q % 4);
-        return i != c.i ? i < c.i : g.second(q % 4) < c.j;
-      };
-      while (k < old.count && earlier(k)) ++k;
-      const bool known =
-          k < old.count && old.pairs[k / 4].first(k % 4) == c.i && old.pairs[k / 4].second(k % 4) == c.j;
+      if (dot(d, d) >= reach * reach) {
+        c.place = not_near;
+        continue;
+      }
       Index target = c.j;
       if (part == 1) {
         Link& link = links_[c.link];
         target = link.first + link.used++;
-        slot_owner_.data()[target - n_ - 2 * static_cast<Index>(chunks_.size())] = c.j;
+        slot_owner_.data()[target] = c.j;
       }
-      list.add(c.i, c.j, target, known ? old.spring(k) : Spring<double>{{0, 0, 0}, 0});
-      if (const auto group = static_cast<Index>(list.pairs.size() - 1);
-          !(d == plain) && (list.across_sides.empty() || list.across_sides.back() != group))
-        list.across_sides.push_back(group);
+      const Spring<double> spring = c.place == not_near ? Spring<double>{{0, 0, 0}, 0} : old.spring(c.place);
+      c.place = list.add(c.i, c.j, target, !(d == plain), spring);
     }
-    list.pad(dummy);
+    list.pad(chunk.begin, n_, part == 1 ? 0 : chunk.begin);
     std::swap(old, list);
   }
 
@@ -320,36 +333,30 @@ void PairEngine::rebuild_near(Chunk& chunk, const Drive& drive, double near_marg
 }
 
 template <Features F>
-void PairEngine::pair_forces(Chunk& chunk, double dt) {
+void PairEngine::pair_forces(Chunk& chunk, double dt, LoadRow* load) {
   constexpr Features pairs = between_grains(F);
-  pair_forces<pairs, false>(chunk.near[0], dt);
-  pair_forces<pairs, true>(chunk.near[1], dt);
+  pair_forces<pairs, false>(chunk.near[0], dt, load);
+  pair_forces<pairs, true>(chunk.near[1], dt, load);
 }
 
-// Turns what a group's pairs do to their grains back into rows and adds them up, or leaves j's share in its
+// Turns what a group's pairs do to their grains back into lines and adds them up, or leaves j's share in its
 // slot.
 template <Features F, bool to_slots>
-inline void PairEngine::scatter(const PairGroup& p, const Geometry<Pack>& at, const Vec3<Pack>& force,
-                                const Vec3<Pack>& f_x_n, const Pack& slip, LoadRow* loads) {
-  const auto load = [first = reinterpret_cast<char*>(loads)](Offset o) -> LoadRow& {
-    return *reinterpret_cast<LoadRow*>(first + o);
+inline void PairEngine::scatter(const PairGroup& p, const Geometry<Pack>& at, const Vec3<Pack>& f,
+                                const Vec3<Pack>& f_x_n, const Pack& slip, LoadRow* load, LoadRow* slot) {
+  const auto row_at = [](LoadRow* first, Offset o) -> double* {
+    return reinterpret_cast<double*>(reinterpret_cast<char*>(first) + o);
   };
-  Pack f[4] = {force.x, force.y, force.z, F.ledger ? slip : Pack(0.0)};
-  transpose(f[0], f[1], f[2], f[3]);
-  [[maybe_unused]] Pack t[4];
-  if constexpr (F.friction) {
-    t[0] = f_x_n.x, t[1] = f_x_n.y, t[2] = f_x_n.z, t[3] = 0.0;
-    transpose(t[0], t[1], t[2], t[3]);
-  }
-  for (int k = 0; k < 4; ++k) {
-    LoadRow &a = load(p.i[k]), &b = load(p.target[k]);
-    set_row(a.f, row(a.f) + f[k]);
-    const Pack on_j = F.ledger ? without_last(f[k]) : f[k];
-    set_row(b.f, to_slots ? -on_j : row(b.f) - on_j);
-    if constexpr (F.friction) {
-      set_row(a.torque, fma(Pack(at.l_i[k]), t[k], row(a.torque)));
-      set_row(b.torque, to_slots ? Pack(at.l_j[k]) * t[k] : fma(Pack(at.l_j[k]), t[k], row(b.torque)));
-    }
+  const Pack zero(0.0);
+  const Pack columns[8] = {f.x, f.y, f.z, F.ledger ? slip : zero, f_x_n.x, f_x_n.y, f_x_n.z, zero};
+  Line action[lanes];
+  to_lines(columns, action);
+  for (int k = 0; k < lanes; ++k) {
+    double *const a = row_at(load, p.i[k]), *const b = row_at(to_slots ? slot : load, p.target[k]);
+    const double l_i = F.friction ? at.l_i[k] : 0, l_j = F.friction ? at.l_j[k] : 0;
+    fma(line_of(Row(1.0), l_i), action[k], Line::load(a)).store(a);
+    const Line on_j = line_of(Row(-1, -1, -1, 0), l_j);
+    (to_slots ? on_j * action[k] : fma(on_j, action[k], Line::load(b))).store(b);
   }
 }
 
@@ -357,7 +364,7 @@ inline void PairEngine::scatter(const PairGroup& p, const Geometry<Pack>& at, co
 // back and add up. One group alone is a long chain of dependent operations; in phases the processor works on
 // several at once.
 template <Features F, bool to_slots>
-void PairEngine::pair_forces(PairList& list, double dt) {
+[[gnu::flatten]] void PairEngine::pair_forces(PairList& list, double dt, LoadRow* load) {
   const auto grain = [first = reinterpret_cast<const char*>(grain_.data())](Offset at) -> const GrainRow& {
     return *reinterpret_cast<const GrainRow*>(first + 2 * static_cast<std::size_t>(at));
   };
@@ -367,7 +374,8 @@ void PairEngine::pair_forces(PairList& list, double dt) {
   };
   const ContactParameters law = scene_.grain;
   const Sides sides = sides_;
-  const Pack minus_but_last(-1, -1, -1, 1);
+  const Line difference(-1, -1, -1, -1, -1, -1, -1, 1);
+  constexpr int group_block = block_pairs / lanes;
 
   struct Lanes {
     Vec3<Pack> x_ij;
@@ -382,91 +390,84 @@ void PairEngine::pair_forces(PairList& list, double dt) {
         return before;
     }
   };
-  Lanes lanes[group_block];
+  Lanes motion[group_block];
   Geometry<Pack> geometry[group_block];
   Slide<Pack> slides[group_block];
   Vec3<Pack> delta_t[group_block];
   Grip<Pack> grips[group_block];
 
   const auto groups = static_cast<std::int64_t>(list.pairs.size());
-  auto across = list.across_sides.begin();
   for (std::int64_t start = 0; start < groups; start += group_block) {
     const int block = static_cast<int>(std::min<std::int64_t>(group_block, groups - start));
 
     for (int g = 0; g < block; ++g) {
       const PairGroup& p = list.pairs[start + g];
-      Lanes& q = lanes[g];
-      Pack d[4], v[4], wi[4], wj[4];
-      for (int k = 0; k < 4; ++k) {
-        const GrainRow &a = grain(p.i[k]), &b = grain(p.j[k]);
-        d[k] = row(a.x) - row(b.x);
-        v[k] = fma(minus_but_last, row(b.v), row(a.v));
-        if constexpr (F.friction) wi[k] = row(a.omega), wj[k] = row(b.omega);
-      }
-      transpose(d[0], d[1], d[2], d[3]);
-      transpose(v[0], v[1], v[2], v[3]);
-      Vec3<Pack> x_ij{d[0], d[1], d[2]};
-      if (across != list.across_sides.end() && *across == start + g)
-        x_ij = nearest_image(sides, x_ij), ++across;
-      geometry[g] = between_grains(x_ij, v[3], d[3]);
-      q.before.v = {v[0], v[1], v[2]};
+      Lanes& q = motion[g];
+      Line lines[lanes];
+      Pack c[8];
+      for (int k = 0; k < lanes; ++k) lines[k] = fma(difference, line(grain(p.j[k])), line(grain(p.i[k])));
+      to_columns(lines, c);
+      Vec3<Pack> x_ij{c[0], c[1], c[2]};
+      if (list.across_sides[start + g]) x_ij = nearest_image(sides, x_ij);
+      q.x_ij = x_ij, q.r_sum = c[7], q.r_difference = c[3];
+      q.before.v = {c[4], c[5], c[6]};
       if constexpr (F.friction) {
-        transpose(wi[0], wi[1], wi[2], wi[3]);
-        transpose(wj[0], wj[1], wj[2], wj[3]);
-        q.before.omega_i = {wi[0], wi[1], wi[2]}, q.before.omega_j = {wj[0], wj[1], wj[2]};
+        for (int k = 0; k < lanes; ++k)
+          lines[k] = line_of(numbers(grain(p.i[k]).omega), numbers(grain(p.j[k]).omega));
+        to_columns(lines, c);
+        q.before.omega_i = {c[0], c[1], c[2]}, q.before.omega_j = {c[4], c[5], c[6]};
       }
       if constexpr (F.viscous) {
-        for (int k = 0; k < 4; ++k) {
-          const NowRow &a = now(p.i[k]), &b = now(p.j[k]);
-          v[k] = row(a.v) - row(b.v), wi[k] = row(a.omega), wj[k] = row(b.omega);
-        }
-        transpose(v[0], v[1], v[2], v[3]);
-        transpose(wi[0], wi[1], wi[2], wi[3]);
-        transpose(wj[0], wj[1], wj[2], wj[3]);
-        q.now = {{v[0], v[1], v[2]}, {wi[0], wi[1], wi[2]}, {wj[0], wj[1], wj[2]}};
+        for (int k = 0; k < lanes; ++k)
+          lines[k] = fma(Line(-1, -1, -1, 0, 0, 0, 0, 0), line(now(p.j[k])), line(now(p.i[k])));
+        to_columns(lines, c);
+        q.now.v = {c[0], c[1], c[2]}, q.now.omega_i = {c[4], c[5], c[6]};
+        for (int k = 0; k < lanes; ++k) lines[k] = line(now(p.j[k]));
+        to_columns(lines, c);
+        q.now.omega_j = {c[4], c[5], c[6]};
       }
     }
-    if constexpr (F.friction)
-      for (int g = 0; g < block; ++g) slides[g] = slide(dt, geometry[g], lanes[g].before);
+    for (int g = 0; g < block; ++g) {
+      geometry[g] = between_grains(motion[g].x_ij, motion[g].r_sum, motion[g].r_difference);
+      if constexpr (F.friction) slides[g] = slide(dt, geometry[g], motion[g].before);
+    }
     for (int g = 0; g < block; ++g) {
       const PairGroup& later = list.pairs[std::min(start + g + group_block, groups - 1)];
       for (const Offset j : later.j) __builtin_prefetch(&grain(j).x), __builtin_prefetch(&grain(j).omega);
       if constexpr (F.friction) delta_t[g] = carry(dt, geometry[g], slides[g], list.springs[start + g]);
+      grips[g] = grip<F>(law, geometry[g], motion[g].at_step(), delta_t[g], list.slipping[start + g]);
     }
-    for (int g = 0; g < block; ++g)
-      grips[g] = grip<F>(law, geometry[g], lanes[g].at_step(), delta_t[g], list.slipping[start + g]);
     for (int g = 0; g < block; ++g) {
       const Geometry<Pack>& at = geometry[g];
-      Spring<Pack> spring{list.springs[start + g], 0.0};
-      const Action<Pack> a = act<F>(law, at, lanes[g].at_step(), delta_t[g], grips[g], spring);
+      Spring<Pack> spring{list.springs[start + g], Pack(0.0)};
+      const Action<Pack> a = act<F>(law, at, motion[g].at_step(), delta_t[g], grips[g], spring);
       if constexpr (F.friction) list.springs[start + g] = spring.delta_t;
       if constexpr (F.softening) list.slipping[start + g] = spring.slipping;
-      scatter<F, to_slots>(list.pairs[start + g], at, a.f, a.f_x_n, a.slip, load_.data());
+      scatter<F, to_slots>(list.pairs[start + g], at, a.f, a.f_x_n, a.slip, load, slot_.data());
       if constexpr (F.viscous && F.ledger)
-        scatter<F, to_slots>(list.pairs[start + g], at, a.f_viscous, a.f_x_n_viscous, 0.0, damping_.data());
+        scatter<F, to_slots>(list.pairs[start + g], at, a.f_viscous, a.f_x_n_viscous, Pack(0.0),
+                             damping_.data(), damping_slot_.data());
     }
   }
 }
 
 // What the pairs of other chunks have left in slots for this one.
-void PairEngine::collect(const Chunk& chunk, LoadRow* load) const {
-  const Index first_slot = n_ + 2 * static_cast<Index>(chunks_.size());
+void PairEngine::collect(const Chunk& chunk, LoadRow* load, const LoadRow* slots) const {
   for (const Index l : chunk.incoming) {
     const Link& link = links_[l];
     for (Index slot = link.first; slot < link.first + link.used; ++slot) {
-      LoadRow& to = load[slot_owner_.data()[slot - first_slot]];
-      set_row(to.f, row(to.f) + row(load[slot].f));
-      set_row(to.torque, row(to.torque) + row(load[slot].torque));
+      LoadRow& to = load[slot_owner_.data()[slot]];
+      set_row(to.f, row(to.f) + row(slots[slot].f));
+      set_row(to.torque, row(to.torque) + row(slots[slot].torque));
     }
   }
 }
 
 // What the pairs of other chunks and the walls add, and the chunk's part of the reactions.
 template <Features F>
-void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt) {
-  LoadRow* const load = load_.data();
-  collect(chunk, load);
-  if constexpr (F.viscous && F.ledger) collect(chunk, damping_.data());
+void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt, LoadRow* load) {
+  collect(chunk, load, slot_.data());
+  if constexpr (F.viscous && F.ledger) collect(chunk, damping_.data(), damping_slot_.data());
 
   Reaction& reaction = chunk.at(drive.step).reaction;
   reaction = {};
@@ -489,7 +490,7 @@ void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt) {
     Power power;
     for (Index i = chunk.begin; i < chunk.end; ++i) {
       LoadRow& damping = damping_.data()[i];
-      add_damping_power(power, grain_.data()[i], mobility_.data()[i], load[i], damping, dt);
+      add_damping_power(power, scene_, grain_.data()[i], load[i], damping, dt);
       damping = {};
     }
     reaction.damping_power = power.total();
@@ -497,32 +498,32 @@ void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt) {
 }
 
 template <Features F>
-void PairEngine::integrate(Chunk& chunk, const Drive& drive, std::int64_t step) {
+void PairEngine::integrate(Chunk& chunk, const Drive& drive, std::int64_t step, LoadRow* loads) {
   GrainRow* const grain = grain_.data();
   if (scene_.shear.drive == Shear::Drive::stress)
     for (const Index i : chunk.top_layer) grain[i].v.x = drive.layer_u;
-  const Pack zero(0.0), dt(scene_.dt, scene_.dt, scene_.dt, 0);
-  [[maybe_unused]] const Pack half_dt = Pack(0.5) * dt;
-  Pack sum_f = zero, fastest2 = zero;
+  const Row zero(0.0), dt(scene_.dt, scene_.dt, scene_.dt, 0);
+  [[maybe_unused]] const Row half_dt = Row(0.5) * dt;
+  Row sum_f = zero, fastest2 = zero;
   for (Index i = chunk.begin; i < chunk.end; ++i) {
-    const Pack m = row(mobility_.data()[i]);
-    const Pack inverse_mass = __builtin_shuffle(m.v, zero.v, Pack::Bits{0, 0, 1, 4});
-    const Pack gravity = __builtin_shuffle(m.v, zero.v, Pack::Bits{4, 4, 2, 4});
-    const Pack inverse_inertia = __builtin_shuffle(m.v, zero.v, Pack::Bits{3, 3, 3, 4});
-    LoadRow& load = load_.data()[i];
-    const Pack f = row(load.f), torque = row(load.torque);
-    const Pack acceleration = fma(f, inverse_mass, gravity), spin_acceleration = torque * inverse_inertia;
-    Kinematics<Pack> k{row(grain[i].x), row(grain[i].v), row(grain[i].omega), row(grain[i].rotation)};
+    // Other threads have read these rows; asking for several at once to write to saves most of the waiting.
+    __builtin_prefetch(&grain[i + rows_ahead].x, 1), __builtin_prefetch(&grain[i + rows_ahead].omega, 1);
+    GrainRow& g = grain[i];
+    const Mobility m = mobility(scene_, g);
+    const Row inverse_mass(m.inverse_mass_xy, m.inverse_mass_xy, m.inverse_mass_z, 0);
+    const Row f = row(loads[i].f), torque = row(loads[i].torque);
+    const Row acceleration = fma(f, inverse_mass, Row(0, 0, m.gravity, 0));
+    const Row spin_acceleration = torque * Row(m.inverse_inertia);
+    Kinematics<Row> k{row(g.x), row(g.v), row(g.omega), row(g.rotation)};
     leapfrog(k, acceleration, spin_acceleration, dt);
-    set_row(grain[i].x, k.x), set_row(grain[i].v, k.v), set_row(grain[i].omega, k.omega);
-    set_row(grain[i].rotation, k.rotation);
+    set_row(g.x, k.x), set_row(g.v, k.v), set_row(g.omega, k.omega), set_row(g.rotation, k.rotation);
     if constexpr (F.damped) {
       set_row(now_.data()[i].v, fma(half_dt, acceleration, k.v));
       set_row(now_.data()[i].omega, fma(half_dt, spin_acceleration, k.omega));
     }
     sum_f += f;
     fastest2 = max(k.v * k.v, fastest2);
-    set_row(load.f, zero), set_row(load.torque, zero);
+    set_row(loads[i].f, zero), set_row(loads[i].torque, zero);
   }
   if constexpr (F.damped)
     if (scene_.shear.drive == Shear::Drive::stress)
@@ -546,10 +547,9 @@ void PairEngine::report_lost() const {
 
 template <Features F>
 void PairEngine::evaluate(double dt) {
-  for (Index i = 0; i < n_; ++i) load_.data()[i] = {};
-  for (Index i = 0; i < n_ && damping_.size() > 0; ++i) damping_.data()[i] = {};
-  for (Chunk& chunk : chunks_) pair_forces<F>(chunk, dt);
-  for (Chunk& chunk : chunks_) finish<F>(chunk, course_.drive, dt);
+  clear(load_), clear(damping_);
+  for (Chunk& chunk : chunks_) pair_forces<F>(chunk, dt, load_.data());
+  for (Chunk& chunk : chunks_) finish<F>(chunk, course_.drive, dt, load_.data());
 }
 
 // Steps until all are done, or until new candidates are needed (then it is left between integration and
@@ -570,10 +570,34 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
     bool closed = start_closed, forces_next = start_at_forces, integrated = false, rebuild = false;
     std::int64_t left = wanted;
     Pause reason = Pause::done;
-    std::vector<Chunk*> waiting;
-    const auto mine = [&](auto&& work) {  // dealt in turns, so that all threads sweep upwards together
-      for (std::size_t c = thread; c < chunks_.size(); c += space_.threads) work(chunks_[c]);
+    struct Waiting {
+      Chunk* chunk;
+      LoadRow* load;
     };
+    std::vector<Waiting> waiting;
+    std::vector<Host::Array<LoadRow>>& buffers = buffers_[thread];
+    std::vector<LoadRow*> free_buffers;
+    for (Host::Array<LoadRow>& b : buffers) free_buffers.push_back(b.data());
+    const auto buffer = [&] {
+      if (free_buffers.empty()) {
+        buffers.emplace_back().resize(chunk_size_);
+        clear(buffers.back());
+        free_buffers.push_back(buffers.back().data());
+      }
+      LoadRow* const taken = free_buffers.back();
+      free_buffers.pop_back();
+      return taken;
+    };
+    // Each thread has a stretch of neighbours, most of which it finds in its own cache from the last step,
+    // and begins with those that other threads wait for.
+    const std::size_t first = chunks_.size() * thread / space_.threads,
+                      end = chunks_.size() * (thread + 1) / space_.threads;
+    std::vector<Chunk*> mine;
+    for (std::size_t c = first; c < end; ++c) mine.push_back(&chunks_[c]);
+    std::stable_partition(mine.begin(), mine.end(), [&](const Chunk* c) {
+      return std::any_of(c->outgoing.begin(), c->outgoing.end(),
+                         [&](Index l) { return static_cast<std::size_t>(links_[l].to) >= end; });
+    });
     const auto close_and_advance = [&] {
       if (!closed) drive.close(scene_, sum_reactions(drive.step));
       drive.advance(scene_);
@@ -586,9 +610,11 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
           barrier.wait();
           close_and_advance();
         }
-        if (!integrated) mine([&](Chunk& c) { integrate<F>(c, drive, step); });
+        if (!integrated)
+          for (Chunk* c : mine) integrate<F>(*c, drive, step, load_.data());
         const bool guard = left == 1 || left % steps_between_checks == 0;
-        if (guard) mine([&](Chunk& c) { check(c, drive); });
+        if (guard)
+          for (Chunk* c : mine) check(*c, drive);
         barrier.wait();
 
         if (!layer_by_stress) close_and_advance();
@@ -617,28 +643,44 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
       forces_next = false;
       --left;
       integrated = left > 0 && !layer_by_stress;
-      const auto complete = [&](Chunk& c) {
-        finish<F>(c, drive, dt);
-        if (integrated) integrate<F>(c, drive, drive.step);
+      // Loads that are asked for after this step go to their own place, all others to a buffer.
+      const auto complete = [&](Waiting w) {
+        finish<F>(*w.chunk, drive, dt, w.load);
+        if (!integrated) return;
+        integrate<F>(*w.chunk, drive, drive.step, w.load);
+        free_buffers.push_back(w.load + w.chunk->begin);
       };
       const auto take_on = [&](Chunk& c) {
         Progress& progress = progress_[&c - chunks_.data()];
         if (!progress.take(drive.step)) return;
         if (rebuild) rebuild_near(c, drive, course.near_margin);
-        pair_forces<F>(c, dt);
+        const Waiting w{&c, integrated ? buffer() - c.begin : load_.data()};
+        pair_forces<F>(c, dt, w.load);
         progress.done.store(drive.step, std::memory_order_release);
         if (others_are_done(c, drive.step))
-          complete(c);
+          complete(w);
         else
-          waiting.push_back(&c);
+          waiting.push_back(w);
       };
-      mine(take_on);
-      for (Chunk& c : chunks_) take_on(c);  // what a slower thread has not come to
-      for (Chunk* c : waiting) {
-        wait_until([&] { return others_are_done(*c, drive.step); });
-        complete(*c);
+      for (Chunk* c : mine) take_on(*c);
+      std::size_t all_taken_from = chunks_.size();
+      for (Patience patience;;) {
+        const auto ready = std::find_if(waiting.begin(), waiting.end(), [&](const Waiting& w) {
+          return others_are_done(*w.chunk, drive.step);
+        });
+        if (ready != waiting.end()) {
+          complete(*ready);
+          waiting.erase(ready);
+          continue;
+        }
+        while (all_taken_from > 0 && progress_[all_taken_from - 1].is_taken(drive.step)) --all_taken_from;
+        if (waiting.empty() && all_taken_from == 0) break;
+        patience.wait();
+        if (all_taken_from > 0 && patience.turns() > turns_before_help) {
+          take_on(chunks_[all_taken_from - 1]);
+          patience.renew();
+        }
       }
-      waiting.clear();
       rebuild = false;
     }
     if (thread == 0) course_ = course, closed_ = closed, steps = left, pause = reason;
@@ -677,11 +719,11 @@ State PairEngine::state() const {
   }
   for (Index i = 0; i < n_; ++i) append_grain(s, grain_.data()[i], load_.data()[i], role_.data()[i]);
   for (const Chunk& chunk : chunks_) {
-    for (const PairList& list : chunk.near)
-      for (std::int64_t k = 0; k < list.count; ++k) {
-        const Index i = list.pairs[k / 4].first(k % 4), j = list.pairs[k / 4].second(k % 4);
-        append_contact(s, scene_, sides_, grain_.data()[i], grain_.data()[j], i, j, list.spring(k));
-      }
+    for (int part = 0; part < 2; ++part)
+      for (const Candidate& c : chunk.candidates[part])
+        if (c.place != not_near)
+          append_contact(s, scene_, sides_, grain_.data()[c.i], grain_.data()[c.j], c.i, c.j,
+                         chunk.near[part].spring(c.place));
     for (const WallPair& w : chunk.walls)
       append_wall_contact(s, scene_, drive, grain_.data()[w.i], w.i, w.wall, w.spring);
   }

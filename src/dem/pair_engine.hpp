@@ -1,4 +1,4 @@
-// The CPU's engine: each pair of near grains once, four at a time in SIMD lanes.
+// The CPU's engine: each pair of near grains once, as many at a time as there are SIMD lanes.
 //
 // Three lists, each drawn from the one before: candidates within the neighbour margin (cells, rebuilt every
 // few thousand steps), near pairs within a much smaller margin (every few dozen), and of these the
@@ -8,7 +8,8 @@
 //
 // So only earlier chunks read a chunk's grains or send it shares. Once their pairs are done, it is finished
 // and its grains move on to the next step at once, while they are still in the cache: one pass over memory
-// and one barrier a step.
+// and one barrier a step. Loads live only from a chunk's pairs to its integration, in a buffer that a thread
+// uses again for its next chunk.
 #pragma once
 #include <array>
 #include <atomic>
@@ -42,29 +43,32 @@ class PairEngine final : public Engine {
   static constexpr Offset row_bytes = sizeof(LoadRow);
   static_assert(sizeof(GrainRow) == 2 * row_bytes && sizeof(NowRow) == row_bytes);
 
+  static constexpr int lanes = Pack::width;
   struct PairGroup {
-    std::array<Offset, 4> i, j;
-    std::array<Offset, 4> target;  // where j's share goes: j itself, or a slot
-
-    Index first(int lane) const { return static_cast<Index>(i[lane] / row_bytes); }
-    Index second(int lane) const { return static_cast<Index>(j[lane] / row_bytes); }
+    std::array<Offset, lanes> i, j;
+    std::array<Offset, lanes> target;  // where j's share goes: j itself, or (from the first slot) a slot
   };
+  // Near pairs, by (i, j).
   struct PairList {
     std::vector<PairGroup> pairs;
     std::vector<Vec3<Pack>> springs;
     std::vector<Pack> slipping;
-    std::vector<Index> across_sides;  // groups with a pair that touches across periodic sides, ascending
-    std::int64_t count = 0;
+    std::vector<bool> across_sides;  // groups with a pair that touches across periodic sides
+    Index count = 0;
 
     void clear() { pairs.clear(), springs.clear(), slipping.clear(), across_sides.clear(), count = 0; }
-    void add(Index i, Index j, Index target, const Spring<double>& spring);
-    void pad(Index first_dummy);  // fills the last group with a pair that never touches
-    Spring<double> spring(std::int64_t k) const;
+    // Returns its place in the list. target: see PairGroup.
+    Index add(Index i, Index j, Index target, bool across_sides, const Spring<double>& spring);
+    // Fills the last group with a pair that never touches.
+    void pad(Index i, Index far_away, Index target);
+    Spring<double> spring(Index place) const;
   };
   struct Candidate {
     Index i, j;
-    Index link;  // for pairs across chunks
+    Index link;   // for pairs across chunks
+    Index place;  // in the near list, or not_near
   };
+  static constexpr Index not_near = -1;
   struct WallPair {
     Index i;
     WallName wall;
@@ -97,9 +101,8 @@ class PairEngine final : public Engine {
   // The last step at which a thread took a chunk on, and at which its pairs were done.
   struct alignas(64) Progress {
     std::atomic<std::int64_t> taken{-1}, done{-1};
-    bool take(std::int64_t step) {
-      return taken.load(std::memory_order_relaxed) != step && taken.exchange(step) != step;
-    }
+    bool is_taken(std::int64_t step) const { return taken.load(std::memory_order_relaxed) == step; }
+    bool take(std::int64_t step) { return !is_taken(step) && taken.exchange(step) != step; }
   };
   // Each thread's own copy of what all agree on.
   struct Course {
@@ -109,6 +112,7 @@ class PairEngine final : public Engine {
   };
   enum class Pause { done, search, lost };
 
+  void place_contacts(const std::vector<Contact>& contacts);
   void find_candidates();
   void rebuild_near(Chunk& chunk, const Drive& drive, double near_margin);
   double choose_near_margin(double speed, double moved) const;
@@ -122,18 +126,19 @@ class PairEngine final : public Engine {
   Pause run(std::int64_t& steps, bool& at_forces);
   template <Features F>
   void evaluate(double dt);
+  // load: where that of grain 0 would be, though only those of the chunk's grains need exist.
   template <Features F>
-  void pair_forces(Chunk& chunk, double dt);
+  void pair_forces(Chunk& chunk, double dt, LoadRow* load);
   template <Features F, bool to_slots>
-  void pair_forces(PairList& list, double dt);
+  void pair_forces(PairList& list, double dt, LoadRow* load);
   template <Features F, bool to_slots>
   static void scatter(const PairGroup& pairs, const Geometry<Pack>& geometry, const Vec3<Pack>& f,
-                      const Vec3<Pack>& f_x_n, const Pack& slip, LoadRow* loads);
-  void collect(const Chunk& chunk, LoadRow* load) const;
+                      const Vec3<Pack>& f_x_n, const Pack& slip, LoadRow* load, LoadRow* slot);
+  void collect(const Chunk& chunk, LoadRow* load, const LoadRow* slot) const;
   template <Features F>
-  void finish(Chunk& chunk, const Drive& drive, double dt);
+  void finish(Chunk& chunk, const Drive& drive, double dt, LoadRow* load);
   template <Features F>
-  void integrate(Chunk& chunk, const Drive& drive, std::int64_t step);
+  void integrate(Chunk& chunk, const Drive& drive, std::int64_t step, LoadRow* load);
   void check(Chunk& chunk, const Drive& drive) const;
   [[noreturn]] void report_lost() const;
 
@@ -153,11 +158,12 @@ class PairEngine final : public Engine {
   std::unique_ptr<Progress[]> progress_;  // by chunk
   std::vector<Link> links_;
   Host::Array<Index> slot_owner_;
-  Host::Array<GrainRow> grain_;   // n grains, then two dummies for each chunk
-  Host::Array<NowRow> now_;       // viscous only
-  Host::Array<LoadRow> load_;     // n grains, dummies, slots
-  Host::Array<LoadRow> damping_;  // the viscous part of it, where the ledger asks for it
-  Host::Array<Mobility> mobility_;
+  Host::Array<GrainRow> grain_;  // n grains, then one that never touches
+  Host::Array<NowRow> now_;      // viscous only
+  Host::Array<LoadRow> load_;    // of the last step of advance()
+  Host::Array<LoadRow> slot_;
+  Host::Array<LoadRow> damping_, damping_slot_;  // the viscous part of them, where the ledger asks for it
+  std::vector<std::vector<Host::Array<LoadRow>>> buffers_;  // by thread: loads of a chunk, all zero
   Host::Array<Role> role_;
   Neighbours<Host> neighbours_;
   Course course_;
