@@ -17,7 +17,7 @@ constexpr int block_pairs = 64;  // that go through the phases together
 constexpr int rows_ahead = 8;
 // A chunk costs as much to bring into another core's cache as to compute, so it changes hands only where its
 // thread is held up for longer than that.
-constexpr int turns_before_help = 1000;
+constexpr int turns_before_help = 300;
 constexpr int steps_between_checks = 256;
 constexpr int steps_near_list_should_last = 80;
 
@@ -40,6 +40,9 @@ template <class Member>
 const double* numbers(const Member& m) {
   return reinterpret_cast<const double*>(&m);
 }
+
+// j's line times this and i's line: x_ij, r_i - r_j, v_ij, r_i + r_j.
+const Line i_minus_j(-1, -1, -1, -1, -1, -1, -1, 1);
 
 void clear(Host::Array<LoadRow>& loads) { std::fill(loads.data(), loads.data() + loads.size(), LoadRow{}); }
 
@@ -139,6 +142,10 @@ void PairEngine::load(const Scene& scene, const State& s) {
   place_contacts(s.contacts);
   for (const WallContact& w : s.wall_contacts)
     chunks_[w.i / chunk_size_].walls.push_back({w.i, w.wall, {w.delta_t, w.slipping}});
+  for (Chunk& chunk : chunks_)
+    std::sort(chunk.walls.begin(), chunk.walls.end(), [](const WallPair& a, const WallPair& b) {
+      return std::tie(a.i, a.wall) < std::tie(b.i, b.wall);
+    });
 
   course_ = {};
   course_.drive = drive_of(scene, s);
@@ -296,31 +303,46 @@ void PairEngine::rebuild_near(Chunk& chunk, const Drive& drive, double near_marg
     PairList& old = chunk.near[part];
     PairList& list = chunk.spare;
     list.clear();
-    for (Candidate& c : chunk.candidates[part]) {
-      const Vec3d plain = grain[c.i].x - grain[c.j].x, d = nearest_image(sides_, plain);
-      const double reach = grain[c.i].r + grain[c.j].r + near_margin;
-      if (dot(d, d) >= reach * reach) {
-        c.place = not_near;
-        continue;
+    std::vector<Candidate>& candidates = chunk.candidates[part];
+    for (std::size_t start = 0; start < candidates.size(); start += lanes) {
+      const int used = static_cast<int>(std::min<std::size_t>(lanes, candidates.size() - start));
+      Line lines[lanes];
+      Pack c[8];
+      for (int k = 0; k < lanes; ++k) {
+        const Candidate& q = candidates[start + std::min(k, used - 1)];
+        lines[k] = fma(i_minus_j, line(grain[q.j]), line(grain[q.i]));
       }
-      Index target = c.j;
-      if (part == 1) {
-        Link& link = links_[c.link];
-        target = link.first + link.used++;
-        slot_owner_.data()[target] = c.j;
+      to_columns(lines, c);
+      const Vec3<Pack> plain{c[0], c[1], c[2]}, d = nearest_image(sides_, plain), shift = d - plain;
+      const Pack reach = c[7] + Pack(near_margin);
+      const Pack apart = dot(d, d) - reach * reach, across = dot(shift, shift);
+      for (int k = 0; k < used; ++k) {
+        Candidate& q = candidates[start + k];
+        if (!(apart[k] < 0)) {
+          q.place = not_near;
+          continue;
+        }
+        Index target = q.j;
+        if (part == 1) {
+          Link& link = links_[q.link];
+          target = link.first + link.used++;
+          slot_owner_.data()[target] = q.j;
+        }
+        const Spring<double> spring = q.place == not_near ? Spring<double>{{0, 0, 0}, 0} : old.spring(q.place);
+        q.place = list.add(q.i, q.j, target, across[k] > 0, spring);
       }
-      const Spring<double> spring = c.place == not_near ? Spring<double>{{0, 0, 0}, 0} : old.spring(c.place);
-      c.place = list.add(c.i, c.j, target, !(d == plain), spring);
     }
     list.pad(chunk.begin, n_, part == 1 ? 0 : chunk.begin);
     std::swap(old, list);
   }
 
   std::vector<WallPair> walls;
+  auto known = chunk.walls.begin();  // sorted by grain, then wall
   const auto add = [&](Index i, WallName wall) {
-    const auto same = [&](const WallPair& w) { return w.i == i && w.wall == wall; };
-    const auto known = std::find_if(chunk.walls.begin(), chunk.walls.end(), same);
-    walls.push_back(known != chunk.walls.end() ? *known : WallPair{i, wall, {{0, 0, 0}, 0}});
+    const auto at = [](const WallPair& w) { return std::tie(w.i, w.wall); };
+    while (known != chunk.walls.end() && at(*known) < std::tie(i, wall)) ++known;
+    const bool same = known != chunk.walls.end() && at(*known) == std::tie(i, wall);
+    walls.push_back(same ? *known : WallPair{i, wall, {{0, 0, 0}, 0}});
   };
   for (Index i = chunk.begin; i < chunk.end; ++i) {
     if (!meets_walls(scene_, role_.data()[i])) continue;
@@ -374,7 +396,7 @@ template <Features F, bool to_slots>
   };
   const ContactParameters law = scene_.grain;
   const Sides sides = sides_;
-  const Line difference(-1, -1, -1, -1, -1, -1, -1, 1);
+  const Line difference = i_minus_j;
   constexpr int group_block = block_pairs / lanes;
 
   struct Lanes {
@@ -503,17 +525,18 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive, std::int64_t step, 
   if (scene_.shear.drive == Shear::Drive::stress)
     for (const Index i : chunk.top_layer) grain[i].v.x = drive.layer_u;
   const Row zero(0.0), dt(scene_.dt, scene_.dt, scene_.dt, 0);
+  const Row all_three(1, 1, 1, 0), only_z(0, 0, 1, 0), gravity(0, 0, -scene_.gravity, 0);
   [[maybe_unused]] const Row half_dt = Row(0.5) * dt;
   Row sum_f = zero, fastest2 = zero;
   for (Index i = chunk.begin; i < chunk.end; ++i) {
     // Other threads have read these rows; asking for several at once to write to saves most of the waiting.
     __builtin_prefetch(&grain[i + rows_ahead].x, 1), __builtin_prefetch(&grain[i + rows_ahead].omega, 1);
     GrainRow& g = grain[i];
-    const Mobility m = mobility(scene_, g);
-    const Row inverse_mass(m.inverse_mass_xy, m.inverse_mass_xy, m.inverse_mass_z, 0);
+    const bool free = g.inverse_inertia > 0;  // as in mobility()
+    const Row inverse_mass = Row(g.inverse_mass) * (free ? all_three : only_z);
     const Row f = row(loads[i].f), torque = row(loads[i].torque);
-    const Row acceleration = fma(f, inverse_mass, Row(0, 0, m.gravity, 0));
-    const Row spin_acceleration = torque * Row(m.inverse_inertia);
+    const Row acceleration = fma(f, inverse_mass, free ? gravity : zero);
+    const Row spin_acceleration = torque * Row(g.inverse_inertia);
     Kinematics<Row> k{row(g.x), row(g.v), row(g.omega), row(g.rotation)};
     leapfrog(k, acceleration, spin_acceleration, dt);
     set_row(g.x, k.x), set_row(g.v, k.v), set_row(g.omega, k.omega), set_row(g.rotation, k.rotation);
