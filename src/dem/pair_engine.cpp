@@ -22,7 +22,7 @@ constexpr int steps_between_checks = 256;
 constexpr int steps_near_list_should_last = 80;
 
 // A vector and the number behind it.
-using Row = Simd<4>;
+using Row = Pack;
 template <class Member>
 Row row(const Member& v) {
   return Row::load(reinterpret_cast<const double*>(&v));
@@ -36,13 +36,8 @@ template <class Struct>
 Line line(const Struct& s) {
   return Line::load(reinterpret_cast<const double*>(&s));
 }
-template <class Member>
-const double* numbers(const Member& m) {
-  return reinterpret_cast<const double*>(&m);
-}
-
 // j's line times this and i's line: x_ij, r_i - r_j, v_ij, r_i + r_j.
-const Line i_minus_j(-1, -1, -1, -1, -1, -1, -1, 1);
+const Line i_minus_j{-1.0, Row(-1, -1, -1, 1)};
 
 void clear(Host::Array<LoadRow>& loads) { std::fill(loads.data(), loads.data() + loads.size(), LoadRow{}); }
 
@@ -77,9 +72,7 @@ Spring<double> PairEngine::PairList::spring(Index place) const {
 PairEngine::PairEngine(int threads) : threads_wanted_(threads) { space_.threads = std::max(1, threads); }
 
 std::string PairEngine::describe() const {
-#if defined(__AVX512F__)
-  const char* set = "AVX-512";
-#elif defined(__AVX2__)
+#if defined(__AVX2__)
   const char* set = "AVX2";
 #elif defined(__x86_64__)
   const char* set = "SSE2";
@@ -328,7 +321,8 @@ void PairEngine::rebuild_near(Chunk& chunk, const Drive& drive, double near_marg
           target = link.first + link.used++;
           slot_owner_.data()[target] = q.j;
         }
-        const Spring<double> spring = q.place == not_near ? Spring<double>{{0, 0, 0}, 0} : old.spring(q.place);
+        const Spring<double> spring =
+            q.place == not_near ? Spring<double>{{0, 0, 0}, 0} : old.spring(q.place);
         q.place = list.add(q.i, q.j, target, across[k] > 0, spring);
       }
     }
@@ -376,8 +370,8 @@ inline void PairEngine::scatter(const PairGroup& p, const Geometry<Pack>& at, co
   for (int k = 0; k < lanes; ++k) {
     double *const a = row_at(load, p.i[k]), *const b = row_at(to_slots ? slot : load, p.target[k]);
     const double l_i = F.friction ? at.l_i[k] : 0, l_j = F.friction ? at.l_j[k] : 0;
-    fma(line_of(Row(1.0), l_i), action[k], Line::load(a)).store(a);
-    const Line on_j = line_of(Row(-1, -1, -1, 0), l_j);
+    fma(Line{1.0, l_i}, action[k], Line::load(a)).store(a);
+    const Line on_j{Row(-1, -1, -1, 0), l_j};
     (to_slots ? on_j * action[k] : fma(on_j, action[k], Line::load(b))).store(b);
   }
 }
@@ -434,14 +428,13 @@ template <Features F, bool to_slots>
       q.x_ij = x_ij, q.r_sum = c[7], q.r_difference = c[3];
       q.before.v = {c[4], c[5], c[6]};
       if constexpr (F.friction) {
-        for (int k = 0; k < lanes; ++k)
-          lines[k] = line_of(numbers(grain(p.i[k]).omega), numbers(grain(p.j[k]).omega));
+        for (int k = 0; k < lanes; ++k) lines[k] = {row(grain(p.i[k]).omega), row(grain(p.j[k]).omega)};
         to_columns(lines, c);
         q.before.omega_i = {c[0], c[1], c[2]}, q.before.omega_j = {c[4], c[5], c[6]};
       }
       if constexpr (F.viscous) {
         for (int k = 0; k < lanes; ++k)
-          lines[k] = fma(Line(-1, -1, -1, 0, 0, 0, 0, 0), line(now(p.j[k])), line(now(p.i[k])));
+          lines[k] = fma(Line{Row(-1, -1, -1, 0), 0.0}, line(now(p.j[k])), line(now(p.i[k])));
         to_columns(lines, c);
         q.now.v = {c[0], c[1], c[2]}, q.now.omega_i = {c[4], c[5], c[6]};
         for (int k = 0; k < lanes; ++k) lines[k] = line(now(p.j[k]));

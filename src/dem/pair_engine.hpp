@@ -89,7 +89,7 @@ class PairEngine final : public Engine {
     std::vector<Index> top_layer;
     // What all threads read after a step. Two, for even and odd steps: a thread may be at the next step
     // already while another still reads.
-    struct Tally {
+    struct alignas(64) Tally {
       Reaction reaction;
       double slip = 0;                 // J, dissipated in the step
       double fastest2[3] = {0, 0, 0};  // largest v^2 by component
