@@ -14,7 +14,7 @@ namespace {
 
 constexpr Index no_link = -1;
 constexpr int block_pairs = 64;  // that go through the phases together
-constexpr int rows_ahead = 8;
+constexpr int rows_ahead = 8;    // that integration asks to write to
 // A chunk costs as much to bring into another core's cache as to compute, so it changes hands only where its
 // thread is held up for longer than that.
 constexpr int turns_before_help = 300;
@@ -67,6 +67,17 @@ Spring<double> PairEngine::PairList::spring(Index place) const {
   const Vec3<Pack>& s = springs[place / lanes];
   const int lane = static_cast<int>(place % lanes);
   return {{s.x[lane], s.y[lane], s.z[lane]}, slipping[place / lanes][lane]};
+}
+
+LoadRow* PairEngine::Buffers::take(Index rows) {
+  if (free_.empty()) {
+    all_.emplace_back().resize(rows);
+    clear(all_.back());
+    free_.push_back(all_.back().data());
+  }
+  LoadRow* const taken = free_.back();
+  free_.pop_back();
+  return taken;
 }
 
 PairEngine::PairEngine(int threads) : threads_wanted_(threads) { space_.threads = std::max(1, threads); }
@@ -591,19 +602,7 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
       LoadRow* load;
     };
     std::vector<Waiting> waiting;
-    std::vector<Host::Array<LoadRow>>& buffers = buffers_[thread];
-    std::vector<LoadRow*> free_buffers;
-    for (Host::Array<LoadRow>& b : buffers) free_buffers.push_back(b.data());
-    const auto buffer = [&] {
-      if (free_buffers.empty()) {
-        buffers.emplace_back().resize(chunk_size_);
-        clear(buffers.back());
-        free_buffers.push_back(buffers.back().data());
-      }
-      LoadRow* const taken = free_buffers.back();
-      free_buffers.pop_back();
-      return taken;
-    };
+    Buffers& buffers = buffers_[thread];
     // Each thread has a stretch of neighbours, most of which it finds in its own cache from the last step,
     // and begins with those that other threads wait for.
     const std::size_t first = chunks_.size() * thread / space_.threads,
@@ -664,13 +663,13 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
         finish<F>(*w.chunk, drive, dt, w.load);
         if (!integrated) return;
         integrate<F>(*w.chunk, drive, drive.step, w.load);
-        free_buffers.push_back(w.load + w.chunk->begin);
+        buffers.give_back(w.load + w.chunk->begin);
       };
       const auto take_on = [&](Chunk& c) {
         Progress& progress = progress_[&c - chunks_.data()];
         if (!progress.take(drive.step)) return;
         if (rebuild) rebuild_near(c, drive, course.near_margin);
-        const Waiting w{&c, integrated ? buffer() - c.begin : load_.data()};
+        const Waiting w{&c, integrated ? buffers.take(chunk_size_) - c.begin : load_.data()};
         pair_forces<F>(c, dt, w.load);
         progress.done.store(drive.step, std::memory_order_release);
         if (others_are_done(c, drive.step))

@@ -98,6 +98,16 @@ class PairEngine final : public Engine {
     const Tally& at(std::int64_t step) const { return tally[step & 1]; }
     Tally& at(std::int64_t step) { return tally[step & 1]; }
   };
+  // Loads of one chunk each; all zero when taken and when given back.
+  class Buffers {
+   public:
+    LoadRow* take(Index rows);
+    void give_back(LoadRow* buffer) { free_.push_back(buffer); }
+
+   private:
+    std::vector<Host::Array<LoadRow>> all_;
+    std::vector<LoadRow*> free_;
+  };
   // The last step at which a thread took a chunk on, and at which its pairs were done.
   struct alignas(64) Progress {
     std::atomic<std::int64_t> taken{-1}, done{-1};
@@ -163,7 +173,7 @@ class PairEngine final : public Engine {
   Host::Array<LoadRow> load_;    // of the last step of advance()
   Host::Array<LoadRow> slot_;
   Host::Array<LoadRow> damping_, damping_slot_;  // the viscous part of them, where the ledger asks for it
-  std::vector<std::vector<Host::Array<LoadRow>>> buffers_;  // by thread: loads of a chunk, all zero
+  std::vector<Buffers> buffers_;                 // by thread
   Host::Array<Role> role_;
   Neighbours<Host> neighbours_;
   Course course_;
