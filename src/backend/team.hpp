@@ -15,7 +15,7 @@ inline int available_cores() { return omp_get_num_procs(); }
 class Patience {
  public:
   void wait() {
-    if (++turns_ < 4000) {
+    if (++turns_ < 1000) {
 #if defined(__x86_64__)
       __builtin_ia32_pause();
 #endif
