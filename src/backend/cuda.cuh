@@ -5,8 +5,13 @@
 // other. So one thread works an engine from the first array to the last, and nothing here waits for the whole
 // card: memory comes from the card's pool, in the order of the stream, for cudaFree would.
 #pragma once
+#include <cooperative_groups.h>
+
+#include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <cub/cub.cuh>
+#include <memory>
 #include <vector>
 
 #include "error.hpp"
@@ -34,6 +39,76 @@ template <class Body>
 __global__ void for_each_kernel(std::int64_t n, const __grid_constant__ Body body) {
   const std::int64_t i = blockIdx.x * static_cast<std::int64_t>(blockDim.x) + threadIdx.x;
   if (i < n) body(i);
+}
+
+// Four lanes to an item: a grain has some seven neighbours, and 10,000 grains with four lanes each just fill
+// an H100.
+class CudaTeam {
+ public:
+  static constexpr int most_threads = 384;  // of a block
+  // Eight numbers for each thread, and two more so that rows begin at different banks of memory.
+  struct alignas(16) Slot {
+    double number[10];
+  };
+
+  __device__ explicit CudaTeam(Slot* slots) : slots_(slots) {}
+  __device__ int block() const { return static_cast<int>(blockIdx.x); }
+  __device__ int blocks() const { return static_cast<int>(gridDim.x); }
+
+  template <class F>
+  __device__ void for_each(int count, F&& f) const {
+    for (int k = thread(); k < count; k += threads()) f(k);
+  }
+
+  struct Item {
+    static constexpr int lanes = 4;
+    int index, lane;
+    unsigned together;  // the threads of this warp that have items, as a mask
+    Slot* slot;         // of lane 0
+
+    __device__ bool any(bool so) const { return __any_sync(together, so); }
+    template <class T, class Use>
+    __device__ void in_order(const T& mine, Use&& use) const {
+      static_assert(sizeof(T) <= 8 * sizeof(double) && alignof(T) <= alignof(Slot));
+      *reinterpret_cast<T*>(slot + lane) = mine;
+      __syncwarp(together);
+      for (int k = 0; k < lanes; ++k) use(*reinterpret_cast<const T*>(slot + k));
+      __syncwarp(together);
+    }
+  };
+  template <class F>
+  __device__ void for_each_item(int count, F&& f) const {
+    constexpr int warp = 32, lanes = Item::lanes;
+    const int lane = thread() % lanes;
+    for (int k = thread() / lanes; k < count; k += items_at_once()) {
+      const int left = (count - k) * lanes + thread() % warp - lane;  // threads from the first of this warp
+      f(Item{k, lane, left < warp ? (1u << left) - 1 : ~0u, slots_ + thread() - lane});
+    }
+  }
+  __device__ int items_at_once() const { return threads() / Item::lanes; }
+
+  __device__ void sync() const { __syncthreads(); }
+  template <class F>
+  __device__ void once(F&& f) const {
+    sync();
+    if (thread() == 0) f();
+    sync();
+  }
+  __device__ void barrier() const { cooperative_groups::this_grid().sync(); }
+
+ private:
+  __device__ int thread() const { return static_cast<int>(threadIdx.x); }
+  __device__ int threads() const { return static_cast<int>(blockDim.x); }
+  Slot* slots_;
+};
+
+template <class Body>
+__global__ void __launch_bounds__(CudaTeam::most_threads)
+    cooperate_kernel(const __grid_constant__ Body body) {
+  using Desk = typename Body::Desk;
+  __shared__ CudaTeam::Slot slots[CudaTeam::most_threads];
+  __shared__ alignas(16) unsigned char desk[sizeof(Desk)];
+  body(CudaTeam(slots), *reinterpret_cast<Desk*>(desk));
 }
 
 struct Cuda {
@@ -91,6 +166,41 @@ struct Cuda {
     cuda_check(cudaGetLastError(), "kernel launch");
   }
 
+  // All blocks of such a launch run at once; it waits until they have room. So each engine takes only its
+  // share of the multiprocessors. The fewer blocks, the cheaper the barrier: one on each, that takes all
+  // units in one turn, or where that is too much, of the size that gets most threads to run.
+  template <class Body>
+  void cooperate(std::int64_t units, int unit, const Body& body) const {
+    const auto kernel = cooperate_kernel<Body>;
+    const int unit_threads = unit * CudaTeam::Item::lanes;
+    const auto units_on_each = [&](int units_at_once) {
+      int blocks = 0;
+      cuda_check(
+          cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, units_at_once * unit_threads, 0),
+          "room for blocks");
+      return blocks * units_at_once;
+    };
+    int processors = 0;
+    cuda_check(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, 0), "multiprocessors");
+    processors = std::max(1, processors / engines_.load());
+
+    const int most = CudaTeam::most_threads / unit_threads;
+    int at_once = static_cast<int>(std::min<std::int64_t>((units + processors - 1) / processors, most + 1));
+    if (at_once > most) {
+      at_once = most;
+      for (int k = most - 1; k > 0; --k)
+        if (units_on_each(k) > units_on_each(at_once)) at_once = k;
+    }
+    const std::int64_t wanted = (units + at_once - 1) / at_once,
+                       room = static_cast<std::int64_t>(units_on_each(at_once)) / at_once * processors;
+    Body argument = body;
+    void* arguments[] = {&argument};
+    cuda_check(cudaLaunchCooperativeKernel(kernel, static_cast<unsigned>(std::min(wanted, room)),
+                                           static_cast<unsigned>(at_once * unit_threads), arguments, 0,
+                                           cudaStreamPerThread),
+               "kernel launch");
+  }
+
   void exclusive_scan(const std::int64_t* in, std::int64_t* out, std::int64_t n) const {
     with_scratch([&](void* scratch, std::size_t& bytes) {
       return cub::DeviceScan::ExclusiveSum(scratch, bytes, in, out, n);
@@ -119,6 +229,10 @@ struct Cuda {
   }
 
  private:
+  // Engines that live on the card: each takes its share of the multiprocessors.
+  static inline std::atomic<int> engines_{0};
+  std::shared_ptr<void> counted_{(++engines_, nullptr), [](void*) { --engines_; }};
+
   // CUB's two calls: how much scratch memory, then the work.
   template <class Call>
   void with_scratch(Call&& call) const {

@@ -9,10 +9,58 @@
 #include <vector>
 
 #include "backend/host_device.hpp"
+#include "backend/team.hpp"
 
 namespace moraine {
 
 struct Host {
+  // One of several blocks of threads that work in step, as a body of cooperate() sees it. Here a block is one
+  // thread.
+  class Team {
+   public:
+    Team(int block, int blocks, int items, Barrier& barrier)
+        : block_(block), blocks_(blocks), items_(items), barrier_(barrier) {}
+    int block() const { return block_; }
+    int blocks() const { return blocks_; }
+
+    // f(k) for each k < count, on one thread each.
+    template <class F>
+    void for_each(int count, F&& f) const {
+      for (int k = 0; k < count; ++k) f(k);
+    }
+
+    // An item of work that a few threads do together, its lanes.
+    struct Item {
+      static constexpr int lanes = 1;
+      int index, lane;
+      // Whether it is so for any of those that go through a loop together.
+      bool any(bool so) const { return so; }
+      // use(value of lane 0), use(value of lane 1), ... on each of them.
+      template <class T, class Use>
+      void in_order(const T& mine, Use&& use) const {
+        use(mine);
+      }
+    };
+    // f(item) for each index < count; items_at_once() of them have threads of their own.
+    template <class F>
+    void for_each_item(int count, F&& f) const {
+      for (int k = 0; k < count; ++k) f(Item{k, 0});
+    }
+    int items_at_once() const { return items_; }
+
+    void sync() const {}  // of a block
+    // f() on one thread of the block, between two sync().
+    template <class F>
+    void once(F&& f) const {
+      f();
+    }
+    void barrier() const { barrier_.wait(); }  // of all blocks
+
+   private:
+    int block_, blocks_, items_;
+    Barrier& barrier_;
+  };
+
   template <class T>
   class Array {
    public:
@@ -51,6 +99,19 @@ struct Host {
   void for_each(std::int64_t n, const Body& body) const {
 #pragma omp parallel for schedule(static) num_threads(threads)
     for (std::int64_t i = 0; i < n; ++i) body(i);
+  }
+
+  // body(team, desk) on several blocks at once, each with a desk of its own: memory that its threads share,
+  // in any state. There is work for so many units; a block takes one or several at once, of `unit` items.
+  template <class Body>
+  void cooperate(std::int64_t units, int unit, const Body& body) const {
+    const int blocks = static_cast<int>(std::clamp<std::int64_t>(units, 1, threads));
+    Barrier barrier(blocks);
+    run_team(blocks, [&](int block) {
+      Team team(block, blocks, unit, barrier);
+      typename Body::Desk desk;
+      body(team, desk);
+    });
   }
 
   // out[k] = in[0] + ... + in[k - 1]

@@ -44,13 +44,12 @@ MORAINE_HD WallAction wall_action(const ContactParameters& law, double dt, const
   return {a.f, g.l_i * a.f_x_n, a.slip, a.f_viscous, g.l_i * a.f_x_n_viscous};
 }
 
-// The forces of viscous contacts on a grain do this much work at step n, when its velocity is half a step
-// further.
-MORAINE_HD void add_damping_power(Power& power, const Scene& scene, const GrainRow& g, const LoadRow& load,
-                                  const LoadRow& damping, double dt) {
+// W, what the forces of viscous contacts do to a grain at step n, when its velocity is half a step further.
+MORAINE_HD double damping_power(const Scene& scene, const GrainRow& g, const LoadRow& load,
+                                const LoadRow& damping, double dt) {
   const Mobility m = mobility(scene, g);
-  power.add(damping, axpy(0.5 * dt, m.acceleration(load.f), g.v),
-            axpy(0.5 * dt, m.spin_acceleration(load.torque), g.omega));
+  return dot(damping.f, axpy(0.5 * dt, m.acceleration(load.f), g.v)) +
+         dot(damping.torque, axpy(0.5 * dt, m.spin_acceleration(load.torque), g.omega));
 }
 
 // A grain that is no longer finite, or outside what bounds it.

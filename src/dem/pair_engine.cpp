@@ -293,9 +293,9 @@ bool PairEngine::others_are_done(const Chunk& chunk, std::int64_t step) const {
 double PairEngine::pending_slip() const {
   double sum = 0;
   for (const Chunk& chunk : chunks_) {
-    double slip = 0;
-    for (Index i = chunk.begin; i < chunk.end; ++i) slip += load_.data()[i].slip;
-    sum += slip;
+    GroupedSum slip;
+    for (Index i = chunk.begin; i < chunk.end; ++i) slip.add(i, load_.data()[i].slip);
+    sum += slip.total();
   }
   return sum;
 }
@@ -495,8 +495,7 @@ void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt, LoadRow* lo
   collect(chunk, load, slot_.data());
   if constexpr (F.viscous && F.ledger) collect(chunk, damping_.data(), damping_slot_.data());
 
-  Reaction& reaction = chunk.at(drive.step).reaction;
-  reaction = {};
+  GroupedSum wall_force, wall_damping, shear_force, layer_damping, power;
   for (WallPair& w : chunk.walls) {
     const GrainRow& g = grain_.data()[w.i];
     const NowRow now = F.damped ? now_.data()[w.i] : NowRow{};
@@ -504,23 +503,22 @@ void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt, LoadRow* lo
     load[w.i].add(a.f, a.torque, a.slip);
     if constexpr (F.damped && F.ledger) damping_.data()[w.i].add(a.f_viscous, a.torque_viscous, 0);
     if (w.wall == WallName::top) {
-      reaction.wall_force -= a.f.z;
-      reaction.wall_damping -= a.f_viscous.z;
+      wall_force.add(w.i, -a.f.z);
+      wall_damping.add(w.i, -a.f_viscous.z);
     }
   }
   for (const Index i : chunk.top_layer) {
-    reaction.shear_force += load[i].f.x;
-    if constexpr (F.damped && F.ledger) reaction.layer_damping += damping_.data()[i].f.x;
+    shear_force.add(i, load[i].f.x);
+    if constexpr (F.damped && F.ledger) layer_damping.add(i, damping_.data()[i].f.x);
   }
-  if constexpr (F.damped && F.ledger) {
-    Power power;
+  if constexpr (F.damped && F.ledger)
     for (Index i = chunk.begin; i < chunk.end; ++i) {
       LoadRow& damping = damping_.data()[i];
-      add_damping_power(power, scene_, grain_.data()[i], load[i], damping, dt);
+      power.add(i, damping_power(scene_, grain_.data()[i], load[i], damping, dt));
       damping = {};
     }
-    reaction.damping_power = power.total();
-  }
+  chunk.at(drive.step).reaction = {wall_force.total(), shear_force.total(), wall_damping.total(),
+                                   layer_damping.total(), power.total()};
 }
 
 template <Features F>
@@ -531,7 +529,7 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive, std::int64_t step, 
   const Row zero(0.0), dt(scene_.dt, scene_.dt, scene_.dt, 0);
   const Row all_three(1, 1, 1, 0), only_z(0, 0, 1, 0), gravity(0, 0, -scene_.gravity, 0);
   [[maybe_unused]] const Row half_dt = Row(0.5) * dt;
-  Row sum_f = zero, fastest2 = zero;
+  Row sum_f = zero, group_f = zero, fastest2 = zero;
   for (Index i = chunk.begin; i < chunk.end; ++i) {
     // Other threads have read these rows; asking for several at once to write to saves most of the waiting.
     __builtin_prefetch(&grain[i + rows_ahead].x, 1), __builtin_prefetch(&grain[i + rows_ahead].omega, 1);
@@ -548,7 +546,8 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive, std::int64_t step, 
       set_row(now_.data()[i].v, fma(half_dt, acceleration, k.v));
       set_row(now_.data()[i].omega, fma(half_dt, spin_acceleration, k.omega));
     }
-    sum_f += f;
+    group_f += f;
+    if (ends_group(i)) sum_f += group_f, group_f = zero;
     fastest2 = max(k.v * k.v, fastest2);
     set_row(loads[i].f, zero), set_row(loads[i].torque, zero);
   }
@@ -556,7 +555,7 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive, std::int64_t step, 
     if (scene_.shear.drive == Shear::Drive::stress)
       for (const Index i : chunk.top_layer) now_.data()[i].v.x = drive.layer_u_ahead;
   Chunk::Tally& tally = chunk.at(step);
-  tally.slip = sum_f[3];
+  tally.slip = (sum_f + group_f)[3];
   for (int a = 0; a < 3; ++a) tally.fastest2[a] = fastest2[a];
 }
 

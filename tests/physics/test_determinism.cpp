@@ -78,6 +78,26 @@ TEST_P(Determinism, NeighbourMargin) {
 
 ON_EVERY_BACKEND(Determinism);
 
+// The GPU's loop on several blocks, which wait for each other once a step. A small margin makes all of them
+// leave again and again for new neighbours.
+TEST(Blocks, OneTwoFour) {
+  for (const Named& scene : scenes()) {
+    SCOPED_TRACE(scene.name);
+    const State& start = scene.bed.state;
+    const State by_pairs = run(*make_engine(Backend::cpu, 1), scene.bed.scene, start, 200);
+    Scene narrow = scene.bed.scene;
+    narrow.neighbour_margin = 0.02 * *std::max_element(start.r.begin(), start.r.end());
+    for (const int blocks : {1, 2, 4}) {
+      const auto engine = make_engine(Backend::reference, blocks);
+      engine->load(narrow, start);
+      for (int k = 0; k < 20; ++k) engine->advance(1);
+      engine->advance(180);
+      expect_same_bits(engine->state(), by_pairs);
+      EXPECT_GT(engine->counts().rebuilds, 1);
+    }
+  }
+}
+
 TEST(Threads, OneTwoFour) {
   for (const Named& scene : scenes()) {
     SCOPED_TRACE(scene.name);
