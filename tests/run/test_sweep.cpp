@@ -117,9 +117,9 @@ TEST_F(Sweep, SameBitsAsAlone) {
 // Each of them is a case like any other.
 TEST_F(Sweep, ItsCasesRunOnTheirOwn) {
   const fs::path small = make("small", small_case());
-  const Outcome o = moraine(to_sweep(small, "seed=4,5"));
+  const Outcome o = moraine(to_sweep(small, "seed=1,3"));
   ASSERT_EQ(o.status, 0) << o.err;
-  const fs::path swept = small / "sweep/seed-4", copy = small / "sweep/copy";
+  const fs::path swept = small / "sweep/seed-1", copy = small / "sweep/copy";
   fs::create_directories(copy);
   fs::copy_file(swept / "case.toml", copy / "case.toml");
   ASSERT_NO_FATAL_FAILURE(run(copy));
