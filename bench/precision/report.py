@@ -137,6 +137,7 @@ def plot(path, smooth, entries, about):
         right.plot([], [], "x", color="0.15", label="some statistic OUTSIDE")
         right.set(xscale="log", yscale="log", xlabel="processor time for a unit of shear strain, s",
                   ylabel="largest difference from paper, s.d. of seeds", title="Sheared beds, statistics over seeds")
+        right.set_ylim(top=8 * right.get_ylim()[1])  # room for the legend
         right.legend(fontsize="x-small", loc="upper right")
     figure.suptitle(f"{about['machine'].get('Model name', '')}, {about['date']}, {about['version']}", fontsize=8, color="0.4")
     figure.savefig(path, dpi=130)

