@@ -5,7 +5,8 @@
 namespace moraine::dem {
 
 inline Features features_of(const Scene& s) {
-  const auto any = [&](auto test) { return test(s.grain) || test(s.wall); };
+  const bool walls = s.floor || s.top_wall.drive != TopWall::Drive::none;
+  const auto any = [&](auto test) { return test(s.grain) || (walls && test(s.wall)); };
   Features f;
   f.friction = any([](const ContactParameters& p) { return p.mu_s > 0 && (p.k_t > 0 || p.gamma_t > 0); });
   const auto viscous = [](const ContactParameters& p) { return p.gamma_n > 0 || p.gamma_t > 0; };

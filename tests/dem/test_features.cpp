@@ -41,5 +41,17 @@ TEST(Features, DampedWallsAreNoMatterOfPairs) {
   EXPECT_TRUE(at_walls(f).viscous);
 }
 
+TEST(Features, OfWallsCountOnlyWhereThereAreWalls) {
+  Scene s;
+  s.grain = {1e7, 1e7, 0, 0, 0, 0}, s.wall = {1e7, 1e7, 100, 100, 0.5, 0.3};
+  s.floor = false;
+  const Features f = features_of(s);
+  EXPECT_FALSE(f.damped || f.friction || f.softening);
+  s.top_wall.drive = TopWall::Drive::velocity;
+  EXPECT_TRUE(features_of(s).damped && features_of(s).friction && features_of(s).softening);
+  s.top_wall.drive = TopWall::Drive::none, s.floor = true;
+  EXPECT_TRUE(features_of(s).damped && features_of(s).friction && features_of(s).softening);
+}
+
 }  // namespace
 }  // namespace moraine::dem
