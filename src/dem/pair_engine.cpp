@@ -13,7 +13,7 @@ namespace moraine::dem {
 namespace {
 
 constexpr Index no_link = -1;
-constexpr int block_pairs = 64;  // that go through the phases together
+constexpr int block_pairs = 16;  // that go through the phases together
 constexpr int rows_ahead = 8;    // that integration asks to write to
 // A chunk costs as much to bring into another core's cache as to compute, so it changes hands only where its
 // thread is held up for longer than that.
