@@ -171,9 +171,9 @@ TEST_F(Sweep, SaysWhatIsWrongBeforeAnythingRuns) {
   expect_fault("seed=1,-1", {"--set seed=-1", "expected >= 0"});
   EXPECT_FALSE(fs::exists(small / "sweep"));
 
-  ASSERT_EQ(moraine(to_sweep(small, "seed=1,2")).status, 0);
-  expect_fault("seed=1,3", {"sweep/seed-1/output", "--resume", "--force"});
-  EXPECT_FALSE(fs::exists(small / "sweep/seed-3"));
+  ASSERT_EQ(moraine(to_sweep(small, "seed=1,3")).status, 0);
+  expect_fault("seed=1,2", {"sweep/seed-1/output", "--resume", "--force"});
+  EXPECT_FALSE(fs::exists(small / "sweep/seed-2"));
 }
 
 }  // namespace
