@@ -73,7 +73,7 @@ struct Case {
   bool periodic_x, periodic_y, periodic_z;
   bool floor;
   Grains grains;
-  std::string preset;       // "none", or what filled f and softening
+  std::string preset;       // "none", or what filled f, softening and wall viscosity
   double softening;         // what the stiffnesses below have been divided by
   double k_n, k_t;          // N/m
   double wall_k_t;          // N/m

@@ -113,9 +113,11 @@ std::vector<Key> make_keys() {
 
       row<&C::wall_k_t>("wall.k_t", "N/m", "0", ">= 0", "tangential stiffness against walls; k_n is that of contacts"),
       row<&C::wall_mass>("wall.mass", "kg", "0", ">= 0", "of the top wall; 0: 0.001 of the mass of N spheres as wide as a lattice cell"),
+      {"wall.gamma_n", Type::number, "N s/m", "1e4", ">= 0", "normal viscosity against walls while settling and consolidating; a stage may have its own", "", set_nothing},
+      {"wall.gamma_t", Type::number, "N s/m", "1e4", ">= 0", "tangential viscosity against walls, likewise", "", set_nothing},
 
       row<&C::gravity>("model.gravity", "m/s2", "9.80665", ">= 0", "along -z"),
-      row<&C::preset>("model.preset", "", "\"none\"", "none | paper | standard | fast", "accuracy against time: sets f and softening where the case does not; see below"),
+      row<&C::preset>("model.preset", "", "\"none\"", "none | paper | standard | fast", "accuracy against time: sets f, softening and the walls' viscosity where the case does not; see below"),
       row<&C::softening>("model.softening", "1", "1", ">= 1", "k_n and k_t of grains and walls are divided by it; viscosities are not"),
       {"model.f", Type::number, "1", "0.075", "> 0", "time step in units of sqrt(min m / max(k_n, k_t)), eq. 9; a stage may have its own", "", set_nothing},
       {"model.dt", Type::number, "s", "0", ">= 0 | auto", "time step; 0: by f; \"auto\": safety times the critical step of the present contact network", "", set_dt},
@@ -143,8 +145,8 @@ std::vector<Key> make_keys() {
       row<&S::gamma_t>("stage.gamma_t", "N s/m", "contact.gamma_t", ">= 0", "tangential viscosity"),
       row<&S::mu_s>("stage.mu_s", "1", "contact.mu_s", ">= 0", "static friction"),
       row<&S::mu_d>("stage.mu_d", "1", "contact.mu_d", ">= 0", "dynamic friction, at most mu_s"),
-      row<&S::wall_gamma_n>("stage.wall_gamma_n", "N s/m", "0" + damped + "1e4", ">= 0", "normal viscosity against walls"),
-      row<&S::wall_gamma_t>("stage.wall_gamma_t", "N s/m", "0" + damped + "1e4", ">= 0", "tangential viscosity against walls"),
+      row<&S::wall_gamma_n>("stage.wall_gamma_n", "N s/m", "0" + damped + "wall.gamma_n", ">= 0", "normal viscosity against walls"),
+      row<&S::wall_gamma_t>("stage.wall_gamma_t", "N s/m", "0" + damped + "wall.gamma_t", ">= 0", "tangential viscosity against walls"),
       row<&S::wall_mu>("stage.wall_mu", "1", "0" + damped + "stage.mu_d", ">= 0", "friction against walls"),
       row<&S::zero_kinematics>("stage.zero_kinematics", "", "true", "", "velocities, spins and rotations begin at zero"),
       row<&S::clear_history>("stage.clear_history", "", "false", "", "tangential springs are forgotten when the stage begins"),

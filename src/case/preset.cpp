@@ -8,18 +8,21 @@ namespace moraine::cases {
 namespace {
 
 std::vector<std::pair<std::string, double>> settings(const Preset& p) {
-  return {{"model.f", p.f}, {"model.softening", p.softening}};
+  return {{"model.f", p.f},
+          {"model.softening", p.softening},
+          {"wall.gamma_n", p.wall_gamma},
+          {"wall.gamma_t", p.wall_gamma}};
 }
 
 }  // namespace
 
 const std::vector<Preset>& presets() {
   static const std::vector<Preset> list = {
-      {"paper", 0.075, 1, "the reference of the others"},
-      {"standard", 0.3, 1,
+      {"paper", 0.075, 1, 1e4, "the reference of the others"},
+      {"standard", 0.3, 1, 2500,
        "3.9 times faster; friction, dilation, shear zone, coordination and porosity within the scatter of 8 "
        "seeds"},
-      {"fast", 0.3, 30,
+      {"fast", 0.3, 30, 450,
        "19 times faster; as standard, but for the coordination, which is 0.34 contacts a grain too high"},
   };
   return list;

@@ -48,7 +48,7 @@ std::vector<Value> values_of(const cases::Override& set) {
     else
       parts.back() += c;
   }
-  if (parts.size() == 1) return {{set.value, ""}};
+  if (parts.size() == 1) return {split_unit(trimmed(set.value))};
 
   std::vector<Value> values;
   for (const string& part : parts) {
@@ -91,9 +91,10 @@ string short_name(const string& key, const std::vector<cases::Override>& lists) 
 Plan plan_sweep(const std::vector<cases::Override>& sets) {
   std::vector<cases::Override> fixed, lists;
   for (const cases::Override& set : sets) (values_of(set).size() == 1 ? fixed : lists).push_back(set);
-  if (lists.empty())
+  if (sets.empty())
     throw error(
         "sweep: nothing to sweep; expected a list of values, such as --set normal_stress=10,20,40kPa");
+  if (lists.empty()) std::swap(fixed, lists);  // a sweep of one case, named as in a longer one
 
   Plan plan{{}, {{"", fixed, {}}}};
   for (const cases::Override& list : lists) {

@@ -217,6 +217,9 @@ TEST_F(CaseTest, a_preset_sets_step_and_stiffness) {
     EXPECT_EQ(c.k_n, 3e8 / p.softening);
     EXPECT_EQ(c.k_t, 2e8 / p.softening);
     EXPECT_EQ(c.wall_k_t, 1e8 / p.softening);
+    EXPECT_EQ(c.stages[0].wall_gamma_n, p.wall_gamma);
+    EXPECT_EQ(c.stages[0].wall_gamma_t, p.wall_gamma);
+    EXPECT_EQ(c.stages[1].wall_gamma_n, 0);
     EXPECT_EQ(c.stages[0].f, p.f);
     EXPECT_EQ(c.stages[1].f, 0.01);  // a stage's own f stays
     EXPECT_NE(reference().find(p.evidence), std::string::npos);
@@ -266,7 +269,7 @@ TEST_F(CaseTest, unknown_keys_name_the_nearest) {
             "x/case.toml:1: [fluid]: unknown table; known: box, grains, contact, wall, model, stage, output, "
             "guards");
   EXPECT_EQ(fault_of("[wall]\nroughness = 9\n" + settle),
-            "x/case.toml:2: wall.roughness = 9: unknown key; known here: k_t, mass");
+            "x/case.toml:2: wall.roughness = 9: unknown key; known here: k_t, mass, gamma_n, gamma_t");
   EXPECT_EQ(
       fault_of(settle + "normal_stres = 3\n"),
       "x/case.toml:5: stage.settle.normal_stres = 3: unknown key; did you mean stage.settle.normal_stress?");
