@@ -1,0 +1,34 @@
+"""Commands on results: python3 -m moraine COMMAND, or ./moraine COMMAND. Each module named here has arguments(parser) and run(args)."""
+import argparse
+import importlib
+import sys
+
+from .case import MissingData
+
+commands = {  # name: (module, what it does)
+    "watch": ("watch", "follow a running case: friction, dilation and energy as they grow"),
+    "figures": ("figures", "draw the paper's figures of one case, or of several beside each other"),
+    "reproduce": ("reproduce", "run a study that is described in cases/, and draw its figures and report"),
+}
+
+
+def main(words=None):
+    parser = argparse.ArgumentParser(prog="moraine", description="Follows, measures and draws results.")
+    parsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    words = sys.argv[1:] if words is None else words
+    for name, (module, what) in commands.items():
+        sub = parsers.add_parser(name, help=what, description=what[0].upper() + what[1:] + ".")
+        if name in words[:1]:
+            importlib.import_module(f".{module}", __package__).arguments(sub)
+    args = parser.parse_args(words)
+    try:
+        return importlib.import_module(f".{commands[args.command][0]}", __package__).run(args) or 0
+    except MissingData as why:
+        print(f"moraine: {why}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())
