@@ -29,11 +29,12 @@ Value split_unit(const string& text) {
   return {text.substr(0, after - text.c_str()), trimmed(after)};
 }
 
-std::vector<Value> values_of(const cases::Override& set) {
+// What stands between the commas outside of quotes and brackets; a last comma ends the list.
+std::vector<string> parts_of(const string& text) {
   std::vector<string> parts(1);
   int depth = 0;
   char quote = 0;
-  for (const char c : set.value) {
+  for (const char c : text) {
     if (quote) {
       if (c == quote) quote = 0;
     } else if (c == '"' || c == '\'') {
@@ -48,8 +49,14 @@ std::vector<Value> values_of(const cases::Override& set) {
     else
       parts.back() += c;
   }
-  if (parts.size() == 1) return {split_unit(trimmed(set.value))};
+  return parts;
+}
 
+bool is_list(const cases::Override& set) { return parts_of(set.value).size() > 1; }
+
+std::vector<Value> values_of(const cases::Override& set) {
+  std::vector<string> parts = parts_of(set.value);
+  if (trimmed(parts.back()).empty()) parts.pop_back();
   std::vector<Value> values;
   for (const string& part : parts) {
     values.push_back(split_unit(trimmed(part)));
@@ -90,11 +97,11 @@ string short_name(const string& key, const std::vector<cases::Override>& lists) 
 
 Plan plan_sweep(const std::vector<cases::Override>& sets) {
   std::vector<cases::Override> fixed, lists;
-  for (const cases::Override& set : sets) (values_of(set).size() == 1 ? fixed : lists).push_back(set);
-  if (sets.empty())
+  for (const cases::Override& set : sets) (is_list(set) ? lists : fixed).push_back(set);
+  if (lists.empty())
     throw error(
-        "sweep: nothing to sweep; expected a list of values, such as --set normal_stress=10,20,40kPa");
-  if (lists.empty()) std::swap(fixed, lists);  // a sweep of one case, named as in a longer one
+        "sweep: nothing to sweep; expected a list of values, such as --set normal_stress=10,20,40kPa, or of "
+        "one: --set normal_stress=10kPa,");
 
   Plan plan{{}, {{"", fixed, {}}}};
   for (const cases::Override& list : lists) {

@@ -1,6 +1,6 @@
 // The cases of a sweep: --set KEY=10,20,40 kPa gives one case for each value, several lists their product. A
 // unit behind the last value is that of all values without one. Commas in quotes or brackets belong to the
-// value. Where none has several values, all together are a sweep of one case.
+// value; a comma behind one value makes it a list of one.
 #pragma once
 #include <string>
 #include <utility>

@@ -1,0 +1,201 @@
+"""The figures of the paper that show whole beds: strength, dilation, profiles, rotation, and the laboratory. Each function takes
+cases or snapshots and gives a Matplotlib figure. Cases of the same normal stress, such as several seeds, are shown as their mean and
+the range between the least and the largest."""
+from itertools import groupby
+
+import numpy as np
+
+from . import compaction, measure, paper, profile, rotation, strength
+from .style import column, ink, lines, page, panel, plt
+
+kPa = 1e3
+
+
+def by_stress(cases):
+    """[(sigma_0, [cases])] in order."""
+    cases = sorted(cases, key=lambda c: c.normal_stress)
+    return [(s, list(own)) for s, own in groupby(cases, key=lambda c: c.normal_stress)]
+
+
+def on_common_strain(cases, name, step=0.0025):
+    """Strains every `step` that all cases have reached, and a row of `name`, smoothed over a strain of 0.01, for each case."""
+    rows = [c.stage("shear").series for c in cases]
+    strain = np.arange(0, min(r["shear_strain"][-1] for r in rows) + 1e-9, step)
+    values = []
+    for r in rows:
+        mean = strength.smoothed(r["shear_strain"], r[name], 0.01)
+        known = np.isfinite(mean)
+        values.append(np.interp(strain, np.r_[0, r["shear_strain"][known]], np.r_[r[name][0], mean[known]]))
+    return strain, np.array(values)
+
+
+def friction_dilation(cases):
+    """Fig. 4: shear friction and dilation against shear strain at each normal stress."""
+    figure, (over, under) = plt.subplots(2, 1, figsize=(column, 4.4), sharex=True, gridspec_kw={"hspace": 0.12})
+    groups = by_stress(cases)
+    for (sigma_0, own), look in zip(groups, lines(len(groups))):
+        look = {k: look[k] for k in ("color", "linestyle")}
+        for axes, name in ((over, "shear_friction"), (under, "dilation_diameters")):
+            strain, values = on_common_strain(own, name)
+            axes.plot(strain, values.mean(axis=0), label=f"{sigma_0 / kPa:g} kPa", **look)
+            if len(own) > 1:
+                axes.fill_between(strain, values.min(axis=0), values.max(axis=0), color=look["color"], alpha=0.18, lw=0)
+    over.set_ylabel("shear friction $\\tau/\\sigma'$")
+    over.set_ylim(0)
+    over.legend(title="$\\sigma_0$", ncol=2, loc="lower right")
+    under.set_ylabel("dilation (mean grain diameters)")
+    under.set_xlabel("shear strain $\\gamma$")
+    under.set_xlim(0)
+    figure.align_ylabels()
+    panel(over, "a"), panel(under, "b")
+    return figure
+
+
+def mohr_coulomb(rows):
+    """Fig. 14, Table 2: peak and ultimate strength of measured runs (see measure.py), their lines, and the other materials'."""
+    figure, both = plt.subplots(2, 1, figsize=(column, 5.2), sharex=True, gridspec_kw={"hspace": 0.14})
+    sigma_0 = np.array([r["sigma_0_kPa"] for r in rows])
+    fits = measure.mohr_coulomb(rows)
+    end = sigma_0.max() * 1.05
+    for axes, key, what, letter, index in ((both[0], "friction_peak", "peak", "a", 0), (both[1], "friction_ultimate", "ultimate", "b", 2)):
+        for (name, values), dashes in zip(paper.materials.items(), ((0, (1, 1)), (0, (4, 1.5)), (0, (7, 1.5)), (0, (4, 1, 1, 1)))):
+            phi, C = values[index:index + 2]
+            grey = "0.35" if "DEM" in name else "0.6"
+            line = C + np.tan(np.radians(phi)) * np.array([0, end])
+            axes.plot([0, end], line, color=grey, linestyle=dashes, lw=0.9, label=f"{name}: {phi:g}°, {C:g} kPa")
+        fit = fits[what]
+        tau = sigma_0 * [r[key] for r in rows]
+        axes.plot([0, end], fit.tau(np.array([0, end]) * kPa) / kPa, color="C0", lw=1.3,
+                  label=f"Moraine: {fit.phi:.1f}°, {fit.C / kPa:.2f} kPa")
+        if what == "peak":
+            raw = sigma_0 * [r["friction_peak_raw"] for r in rows]
+            axes.plot(sigma_0, raw, "+", color="C0", ms=4, mew=0.7, label="raw peaks (0.05 s)")
+        axes.plot(sigma_0, tau, "o", mfc="white", mec="C0", ms=3.4, mew=0.8)
+        axes.set_ylabel(f"{what} shear strength $\\tau_{what[0]}$ (kPa)")
+        axes.set_xlim(0, end)
+        axes.set_ylim(0)
+        axes.legend(loc="upper left", handlelength=2.6)
+        panel(axes, letter)
+    both[1].set_xlabel("normal stress $\\sigma_0$ (kPa)")
+    figure.align_ylabels()
+    return figure
+
+
+def displacement(cases):
+    """Fig. 8: mean displacement along x against height at each normal stress, over the grains of the lowest stress."""
+    figure, axes = plt.subplots(figsize=(column, 3.2))
+    groups = by_stress(cases)
+    first = groups[0][1][0]
+    last = first.stage("shear").snapshots[-1]
+    axes.plot(last.grains["displacement"][:, 0], last.grains["position"][:, 2], ".", color="0.72", ms=1.4, mew=0, rasterized=True,
+              label=f"grains, {groups[0][0] / kPa:g} kPa")
+    for (sigma_0, own), look in zip(groups, lines(len(groups))):
+        profiles = [profile.displacement(c.stage("shear").snapshots[-1]) for c in own]
+        height = np.linspace(max(z[0] for z, _ in profiles), min(z[-1] for z, _ in profiles), 60)
+        mean = np.mean([np.interp(height, z, u) for z, u in profiles], axis=0)
+        axes.plot(mean, height, label=f"{sigma_0 / kPa:g} kPa", markevery=6, ms=2.6, mew=0.6, mfc="white", **look)
+    axes.set_xlabel("displacement along the shear direction (m)")
+    axes.set_ylabel("height above the floor (m)")
+    axes.set_ylim(0)
+    axes.legend(title="$\\sigma_0$", loc="lower right")
+    return figure
+
+
+def porosity(cases):
+    """Fig. 9: porosity of horizontal slabs, one mean grain diameter thick, at the end of shear."""
+    figure, axes = plt.subplots(figsize=(column, 3.2))
+    groups = by_stress(cases)
+    for (sigma_0, own), look in zip(groups, lines(len(groups))):
+        profiles = [profile.porosity(c.stage("shear").snapshots[-1]) for c in own]
+        count = min(len(phi) for _, phi in profiles)
+        middle = np.mean([(edges[1:] + edges[:-1])[:count] / 2 for edges, _ in profiles], axis=0)
+        phi = np.mean([phi[:count] for _, phi in profiles], axis=0)
+        axes.plot(phi[1:-1], middle[1:-1], label=f"{sigma_0 / kPa:g} kPa", markevery=2, ms=2.6, mew=0.6, mfc="white", **look)
+    consolidated = [profile.porosity(c.stage("consolidate").snapshots[-1]) for c in groups[0][1]]
+    count = min(len(phi) for _, phi in consolidated)
+    axes.plot(np.mean([phi[:count] for _, phi in consolidated], axis=0)[1:-1],
+              ((consolidated[0][0][1:] + consolidated[0][0][:-1]) / 2)[:count][1:-1], color="0.7", lw=1,
+              label=f"before, {groups[0][0] / kPa:g} kPa")
+    axes.set_xlabel("porosity of a slab one mean grain diameter thick")
+    axes.set_ylabel("height above the floor (m)")
+    axes.set_ylim(0)
+    axes.legend(title="$\\sigma_0$", loc="lower right")
+    return figure
+
+
+def rotations(snapshot):
+    """Fig. 11: rotation gathered by each grain, one axis against another."""
+    omega = rotation.rotations(snapshot)
+    found = rotation.statistics(snapshot)
+    figure, all_axes = plt.subplots(1, 3, figsize=(page, 2.5), gridspec_kw={"wspace": 0.34})
+    reach = np.percentile(np.abs(omega), 99.8)
+    for axes, (a, b), letter in zip(all_axes, ((0, 1), (0, 2), (1, 2)), "abc"):
+        axes.plot(omega[:, a], omega[:, b], ".", color=ink, alpha=0.25, ms=2, mew=0, rasterized=True)
+        axes.axhline(0, color="0.6", lw=0.5), axes.axvline(0, color="0.6", lw=0.5)
+        axes.plot(found.mean[a], found.mean[b], "+", color="C3", ms=9, mew=1.5)
+        axes.set_xlabel(f"rotation about ${'xyz'[a]}$, $\\Omega_{a + 1}$ (rad)")
+        axes.set_ylabel(f"rotation about ${'xyz'[b]}$, $\\Omega_{b + 1}$ (rad)")
+        axes.set_aspect("equal")
+        axes.set_xlim(-reach, reach), axes.set_ylim(-reach, reach)
+        panel(axes, letter)
+    return figure
+
+
+def laboratory(cases):
+    """Fig. 13: shear stress and dilation at one normal stress, beside what the paper's text and Table 2 state of other materials.
+
+    Their curves are not printed as numbers: marks on the right stand for peak (filled) and ultimate (open) strength after
+    Table 2 at this normal stress, and for total dilation after par. 52.
+    """
+    sigma_0 = cases[0].normal_stress
+    figure, (over, under) = plt.subplots(2, 1, figsize=(column, 4.4), sharex=True, gridspec_kw={"hspace": 0.12})
+    for axes, name, scale in ((over, "shear_friction", sigma_0 / kPa), (under, "dilation_diameters", 1)):
+        strain, values = on_common_strain(cases, name)
+        axes.plot(strain, scale * values.mean(axis=0), color="C0", label="Moraine")
+        if len(cases) > 1:
+            axes.fill_between(strain, scale * values.min(axis=0), scale * values.max(axis=0), color="C0", alpha=0.2, lw=0)
+    end = strain[-1]
+    for k, ((name, (phi_p, C_p, phi_u, C_u)), mark) in enumerate(zip(paper.materials.items(), "s^oD")):
+        at = end * (1.05 + 0.05 * k)
+        for phi, C, face in ((phi_p, C_p, "0.35"), (phi_u, C_u, "white")):
+            over.plot(at, C + sigma_0 / kPa * np.tan(np.radians(phi)), mark, mfc=face, mec="0.35", ms=4, mew=0.8,
+                      label=name if face != "white" else None)
+        if name in paper.dilation:
+            under.plot(at, paper.dilation[name], mark, mfc="0.35", mec="0.35", ms=4, label=name)
+    over.set_ylabel(f"shear stress at $\\sigma_0$ = {sigma_0 / kPa:g} kPa (kPa)")
+    over.set_ylim(0)
+    over.legend(loc="lower center", ncol=2, title="filled: peak, open: ultimate (Table 2)")
+    under.axhline(0, color="0.6", lw=0.5)
+    under.set_ylabel("dilation (mean grain diameters)")
+    under.set_xlabel("shear strain $\\gamma$")
+    under.set_xlim(0, end * 1.25)
+    under.legend(loc="center left", bbox_to_anchor=(0.02, 0.7), title="total (par. 52); the till contracts")
+    figure.align_ylabels()
+    panel(over, "a"), panel(under, "b")
+    return figure
+
+
+def consolidation(cases):
+    """Par. 29: volumetric strain under the top wall, what is still to come of it on a log scale, and the exponential fit."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(page, 2.6), gridspec_kw={"wspace": 0.3})
+    groups = by_stress(cases)
+    for (sigma_0, own), look in zip(groups, lines(len(groups))):
+        look = {k: look[k] for k in ("color", "linestyle")}
+        time, strain = compaction.volumetric_strain(own[0].stage("consolidate"))
+        left.plot(time, 100 * strain, label=f"{sigma_0 / kPa:g} kPa", **look)
+        ahead = strain[-1] - strain
+        right.semilogy(time[ahead > 0], 100 * ahead[ahead > 0], **look)
+        try:
+            for fit, length in zip(compaction.phases(time, strain), (5, 2)):
+                span = np.linspace(fit.begin, fit.begin + length * fit.time, 50)
+                left_over = fit.amplitude * np.exp(-(span - fit.begin) / fit.time) + strain[-1] - fit.final
+                right.semilogy(span[left_over > 0], 100 * left_over[left_over > 0], color="0.55", lw=2.5, alpha=0.45, zorder=0)
+        except (RuntimeError, ValueError):
+            continue
+    left.set_xlabel("time (s)"), left.set_ylabel("volumetric strain (%)")
+    left.set_xlim(0), left.legend(title="$\\sigma_0$", loc="lower right", ncol=2)
+    right.set_xlabel("time (s)"), right.set_ylabel("volumetric strain still to come (%)")
+    right.set_xlim(0)
+    right.text(0.98, 0.95, "grey: exponential fits", transform=right.transAxes, ha="right", va="top", fontsize=7, color="0.35")
+    panel(left, "a"), panel(right, "b")
+    return figure

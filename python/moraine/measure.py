@@ -1,0 +1,106 @@
+"""One line of numbers for each run: everything that the report compares with the paper."""
+from pathlib import Path
+import csv
+
+import numpy as np
+
+from . import compaction, forces, paper, profile, rotation, strength
+from .case import Case, MissingData
+
+
+def runs(directory):
+    """The cases of a study that have been sheared, in order of seed and normal stress."""
+    found = [Case(p.parents[1]) for p in Path(directory).glob("seed-*/shear/sweep/*/output/case.toml")]
+    if not found:
+        raise MissingData(f"{directory}: there is no run; expected seed-*/shear/sweep/*/output")
+    return sorted(found, key=lambda c: (c.settings["grains"]["seed"], c.normal_stress))
+
+
+def hours(case):
+    """Of wall clock that the run took, several at once: from the times of its snapshots; where it was interrupted, without
+    the break."""
+    times = np.sort([f.stat().st_mtime for f in (case.output / "snapshots").glob("*.h5")])
+    steps = np.diff(times)
+    return float(steps[steps <= 20 * np.median(steps)].sum()) / 3600 if len(steps) else np.nan
+
+
+def strengths(case, until=None):
+    """Of the shear stage, up to a strain of `until`: a flat dictionary in the units of its names."""
+    shear = case.stage("shear")
+    s, rows = strength.strength(shear, until=until), shear.series
+    if until is not None:
+        rows = rows.rows(rows["shear_strain"] <= until)
+    late = rows["shear_strain"] >= strength.late * s.strain
+    return {
+        "seed": case.settings["grains"]["seed"], "sigma_0_kPa": shear.settings["normal_stress"] / 1e3, "strain": s.strain,
+        "friction_peak_raw": s.peak_raw, "strain_peak_raw": s.peak_raw_strain, "tau_peak_raw_kPa": s.tau_peak_raw / 1e3,
+        "friction_peak": s.peak, "strain_peak": s.peak_strain,
+        "friction_ultimate": s.ultimate, "friction_ultimate_std": s.ultimate_std,
+        "dilation_d": s.dilation, "strain_dilated": s.dilation_end, "contraction_d": s.contraction,
+        "height_0_m": rows["height"][0], "porosity_0": rows["porosity"][0], "coordination_0": rows["coordination"][0],
+        "coordination": rows["coordination"][late].mean(),
+    }
+
+
+def measure(case):
+    """The strengths, and all that takes snapshots."""
+    shear, consolidate = case.stage("shear"), case.stage("consolidate")
+    sigma_0, d = shear.settings["normal_stress"], case.diameter
+    last, before = shear.snapshots[-1], consolidate.snapshots[-1]
+    out = strengths(case) | {
+        "preset": case.settings["model"]["preset"], "f": shear.settings["f"],
+        "k_n": case.settings["contact"]["k_n"] / case.settings["model"]["softening"], "grains": len(last.grains),
+        "hours": hours(case), "program": case.text.partition("\n")[0].lstrip("# "),
+    }
+    time, strain = compaction.volumetric_strain(consolidate)
+    try:
+        collapse, creep = compaction.phases(time, strain)
+        out |= {"collapse_time_s": collapse.time, "collapse_r2": collapse.r_squared, "creep_time_s": creep.time,
+                "creep_r2": creep.r_squared}
+    except (RuntimeError, ValueError):  # no such curve fits
+        out |= {name: np.nan for name in ("collapse_time_s", "collapse_r2", "creep_time_s", "creep_r2")}
+    out["consolidation_strain"] = strain[-1]
+    out["shear_zone_d"], out["shear_zone_integral_d"] = profile.shear_zone(last)
+    edges, phi = profile.porosity(last)
+    middle = (edges[1:] + edges[:-1]) / 2
+    inner = phi[1:-1]  # the outermost slabs lie at the flat walls
+    out |= {"porosity_max": inner.max(), "porosity_max_below_top_d": (last.top_wall - middle[1:-1][inner.argmax()]) / d}
+    spin = rotation.statistics(last)
+    for axis, mean, variance in zip("xyz", spin.mean, spin.variance):
+        out |= {f"rotation_mean_{axis}": mean, f"rotation_variance_{axis}": variance}
+    out["above_4_consolidated"] = forces.share_above(before, sigma_0)
+    out["above_4_sheared"] = np.mean([forces.share_above(x, sigma_0) for x in shear.snapshots[len(shear.snapshots) * 2 // 3:]])
+    tensor = forces.fabric_tensor(last)
+    out["fabric_zz"] = tensor[2, 2]
+    out["inertia_number"] = compaction.inertia_number(
+        shear.settings["strain_rate"], d / 2, case.settings["grains"]["density"], sigma_0)
+    return out
+
+
+def table(rows, file=None):
+    """The same as CSV text; written to `file` where one is given."""
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    lines = [",".join(names)]
+    for row in rows:
+        lines.append(",".join(f"{row[n]:.6g}" if isinstance(row.get(n), float) else str(row.get(n, "")) for n in names))
+    text = "\n".join(lines) + "\n"
+    if file:
+        Path(file).write_text(text)
+    return text
+
+
+def read_table(file):
+    def value(text):
+        try:
+            return float(text)
+        except ValueError:
+            return text
+    with Path(file).open() as lines:
+        return [{k: value(v) for k, v in row.items()} for row in csv.DictReader(lines)]
+
+
+def mohr_coulomb(rows):
+    """Peak (smoothed and raw) and ultimate strength lines of measured runs."""
+    sigma_0 = np.array([r["sigma_0_kPa"] for r in rows]) * 1e3
+    return {what: strength.mohr_coulomb(sigma_0, sigma_0 * [r[key] for r in rows]) for what, key in
+            (("peak", "friction_peak"), ("peak_raw", "friction_peak_raw"), ("ultimate", "friction_ultimate"))}

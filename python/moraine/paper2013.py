@@ -1,0 +1,131 @@
+"""The study of cases/paper-2013: which runs there are and where they lie. Its Snakefile and `./moraine reproduce` share this.
+
+    runs/NAME/seed-S/settle                            grains settled at random
+    runs/NAME/seed-S/shear/sweep/normal_stress-80kPa   consolidated and sheared
+
+NAME is the preset or quick, with what was set besides: fast+mass-64kg. Such a variant starts from the bed that fast has
+settled, unless what is set concerns that bed (grains, box, the stage settle).
+"""
+from dataclasses import dataclass, field
+from pathlib import Path
+import json
+import os
+import re
+import shlex
+import sys
+
+quick_bed = {"grains.count": "1000", "grains.columns_x": "4", "grains.columns_y": "4"}
+stresses = "10,20,40,60,80,120 kPa"
+
+
+def stress_names(text):
+    """"10,20 kPa" -> ["10kPa", "20kPa"], as `moraine sweep` names them."""
+    parts = [p.strip() for p in text.rstrip(", ").split(",")]
+    unit = re.sub(r"^[-+0-9.eE]+", "", parts[-1]).strip()
+    return [re.sub(r"\s+", "", p) if re.search(r"[a-zA-Z]$", p) else p + unit for p in parts]
+
+
+def variant_name(key, value):
+    return f"{key.rsplit('.', 1)[-1]}-{re.sub(r'[^A-Za-z0-9.-]+', '', value)}"
+
+
+def concerns_bed(key):
+    return key.startswith(("grains.", "box.", "stage.settle."))
+
+
+@dataclass
+class Study:
+    preset: str = "fast"
+    seeds: list = field(default_factory=lambda: [1, 2, 3])
+    stress_list: str = stresses
+    quick: bool = False
+    settings: dict = field(default_factory=dict)    # KEY: VALUE besides the normal stress
+    settled: str = ""                               # name of the study whose settled beds are used; empty: see above
+    results: str = ""
+    moraine: str = "../../moraine"
+    gpu: bool = False
+
+    @property
+    def base(self):
+        return ("quick" if self.preset == "fast" else f"quick-{self.preset}") if self.quick else self.preset
+
+    @property
+    def name(self):
+        return "+".join([self.base] + [variant_name(k, v) for k, v in self.settings.items()])
+
+    @property
+    def bed(self):
+        """Name of the study whose settled grains are sheared."""
+        return self.settled or (self.name if any(map(concerns_bed, self.settings)) else self.base)
+
+    @property
+    def stress_names(self):
+        return stress_names(self.stress_list)
+
+    @property
+    def shear_threads(self):
+        return 1 if self.gpu else len(self.stress_names)
+
+    @property
+    def backend(self):
+        return "--backend cuda" if self.gpu else "--backend cpu"
+
+    @property
+    def python(self):
+        return shlex.quote(sys.executable)
+
+    @classmethod
+    def from_config(cls, config):
+        """From Snakemake's configuration, in which all is text: study="{...}" as `reproduce` gives it, or single values."""
+        given = json.loads(config["study"]) if "study" in config else {k: v for k, v in config.items() if k in cls.__annotations__}
+        study = cls(**given)
+        study.results = study.results or f"runs/{study.name}/results"
+        return study
+
+    def to_config(self):
+        return json.dumps(self.__dict__)
+
+    def case_files(self):
+        """(directory, case.toml) of each case that is to be there before anything runs."""
+        for seed in self.seeds:
+            here = Path("runs") / self.name / f"seed-{seed}"
+            if self.bed == self.name:
+                bed = {k: v for k, v in self.settings.items() if concerns_bed(k)}
+                yield here / "settle", self._text("settle", seed, bed)
+            start = os.path.relpath(Path("runs") / self.bed / f"seed-{seed}" / "settle", here / "shear")
+            rest = {k: v for k, v in self.settings.items() if not k.startswith("stage.settle.")}
+            yield here / "shear", self._text("shear", seed, rest, f'start = "{start}"\n')
+
+    def _text(self, what, seed, settings, more=""):
+        tables = {"model.preset": json.dumps(self.preset), "grains.seed": str(seed)}
+        tables |= {k: toml(v) for k, v in ((quick_bed if self.quick else {}) | settings).items()}
+        text = f'extends = "../../../../{what}"\n{more}'
+        by_table = {}
+        for key, value in tables.items():
+            table, _, leaf = key.rpartition(".")
+            by_table.setdefault(table, []).append(f"{leaf} = {value}\n")
+        for table, lines in by_table.items():
+            stage = table.startswith("stage.")
+            text += f"\n[[stage]]\nname = \"{table[6:]}\"\n" if stage else f"\n[{table}]\n" if table else "\n"
+            text += "".join(lines)
+        return text
+
+
+def toml(value):
+    """A number or a truth value as it is, all else as a text."""
+    try:
+        float(value)
+        return value
+    except ValueError:
+        return value if value in ("true", "false") else json.dumps(value)
+
+
+def write_case(directory, text):
+    """Leaves alone what is there; that of another study under the same name is an error."""
+    file = Path(directory) / "case.toml"
+    if file.exists():
+        if file.read_text() != text:
+            raise SystemExit(f"moraine: {file} is not that of this study; move the folder away, or remove it, and try again")
+        return
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text)

@@ -1,0 +1,69 @@
+"""What varies with height: displacement, the shear zone, porosity (pars. 32 and 33, Figs. 8 and 9)."""
+import numpy as np
+
+from .case import MissingData
+
+
+def slabs(top, thickness):
+    """Edges of horizontal slabs between floor and wall, as thick as asked for or a little thicker, m."""
+    return np.linspace(0, top, max(1, int(top / thickness)) + 1)
+
+
+def displacement(snapshot, thickness=None):
+    """Middle heights (m) and mean displacement along x (m) of the grains whose centres lie in horizontal slabs.
+
+    thickness: of a slab, m; one mean grain diameter by default. Slabs without a grain are left out.
+    """
+    z, u = snapshot.grains["position"][:, 2], snapshot.grains["displacement"][:, 0]
+    edges = slabs(snapshot.top_wall, thickness or 2 * snapshot.grains["radius"].mean())
+    which = np.clip(np.digitize(z, edges) - 1, 0, len(edges) - 2)
+    count = np.bincount(which, minlength=len(edges) - 1)
+    total = np.bincount(which, weights=u, minlength=len(edges) - 1)
+    there = count > 0
+    return ((edges[:-1] + edges[1:]) / 2)[there], total[there] / count[there]
+
+
+def layer_displacement(snapshot):
+    """Of the driven layer, m."""
+    driven = snapshot.grains["role"] == 2
+    if not driven.any():
+        raise MissingData(f"{snapshot.file}:/grains: no grain has role 2: there is no driven layer, the bed is not sheared")
+    return snapshot.grains["displacement"][driven, 0].mean()
+
+
+def shear_zone(snapshot, share=0.05):
+    """Thickness of the shear zone in mean grain diameters, two ways:
+
+    depth     from the middle of the driven layer down to where the slab mean of the displacement along x has fallen to `share`
+              of the layer's (linear between slab middles)
+    integral  the integral over z of u(z)/u_layer: the thickness of a block that moves with the layer and carries as much
+    """
+    d, u_layer = 2 * snapshot.grains["radius"].mean(), layer_displacement(snapshot)
+    driven = snapshot.grains["role"] == 2
+    top = snapshot.grains["position"][driven, 2].mean()
+    z, u = displacement(snapshot)
+    edges = slabs(snapshot.top_wall, d)
+    integral = float(np.sum(u) * (edges[1] - edges[0]) / u_layer)
+    depth = top
+    below = np.flatnonzero(u < share * u_layer)
+    below = below[z[below] < top]
+    if len(below):
+        k = below[-1]  # the highest slab that has stayed behind
+        if k + 1 < len(z):
+            part = (share * u_layer - u[k]) / (u[k + 1] - u[k])
+            depth = top - (z[k] + part * (z[k + 1] - z[k]))
+        else:
+            depth = top - z[k]
+    return depth / d, integral / d
+
+
+def porosity(snapshot, thickness=None):
+    """Edges (m) and porosity of horizontal slabs between floor and top wall; each sphere is cut exactly.
+
+    thickness: of a slab, m; one mean grain diameter by default.
+    """
+    z, r = snapshot.grains["position"][:, 2], snapshot.grains["radius"]
+    edges = slabs(snapshot.top_wall, thickness or 2 * r.mean())
+    h = np.clip(edges[:, None] - (z - r), 0, 2 * r)             # of the part of each sphere below each edge
+    below = (np.pi * h**2 * (3 * r - h) / 3).sum(axis=1)
+    return edges, 1 - np.diff(below) / (snapshot.area * np.diff(edges))

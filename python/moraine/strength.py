@@ -1,0 +1,100 @@
+"""Shear strength: peak and ultimate values of a sheared stage, and the Mohr-Coulomb line through several (eq. 2).
+
+Definitions. Shear friction is tau/sigma', both as measured at the same instant. Two ways to read a peak off it:
+  raw       the largest value of a series with a row every 0.05 s (a strain of 0.0025), as the paper's was. Such a series is
+            noisy, so this is the peak of the strength plus a few standard deviations of the noise
+  smoothed  the largest mean over a shear strain of 0.02
+The ultimate value is the mean over the last third of the strain. Strengths tau_p and tau_u are friction times sigma_0.
+"""
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import optimize, stats
+
+from . import paper
+
+window = 0.02       # of shear strain, over which the smoothed peak is a mean
+late = 2 / 3        # of the strain at the end: where the ultimate state begins
+
+
+@dataclass(frozen=True)
+class Strength:
+    peak_raw: float         # friction
+    peak_raw_strain: float
+    peak: float             # smoothed
+    peak_strain: float      # middle of the window
+    ultimate: float
+    ultimate_std: float     # of the rows in the last third
+    dilation: float         # mean grain diameters, mean over the last tenth of the strain
+    dilation_end: float     # strain at which 95 % of that is reached, smoothed
+    contraction: float      # deepest point below the start, diameters
+    strain: float           # at the end
+    tau_peak_raw: float     # largest shear stress of the same rows as peak_raw, Pa
+
+
+def smoothed(strain, values, width=window):
+    """Means of the rows within width/2 of each; nan where the window reaches beyond the data. Rows in order of strain."""
+    strain, values = np.asarray(strain, float), np.asarray(values, float)
+    total = np.concatenate([[0], np.cumsum(values)])
+    half = width / 2 * (1 + 1e-9)
+    first = np.searchsorted(strain, strain - half, side="left")
+    last = np.searchsorted(strain, strain + half, side="right")
+    mean = (total[last] - total[first]) / (last - first)
+    mean[(strain - half < strain[0] - half * 1e-6) | (strain + half > strain[-1] + half * 1e-6)] = np.nan
+    return mean
+
+
+def every(times, interval):
+    """Indices of the rows nearest to 0, interval, 2 interval, ..."""
+    wanted = np.arange(times[0], times[-1] + 1e-9 * interval, interval)
+    return np.unique(np.clip(np.searchsorted(times, wanted - 1e-6 * interval), 0, len(times) - 1))
+
+
+def strength(stage, sampling=paper.sampling, until=None):
+    """Of a sheared stage. `sampling`: seconds between the rows that the raw peak is read from; `until`: strain to stop at."""
+    rows = stage.series
+    if until is not None:
+        rows = rows.rows(rows["shear_strain"] <= until)
+    strain, friction, dilation = rows["shear_strain"], rows["shear_friction"], rows["dilation_diameters"]
+    raw = every(rows["stage_time"], sampling)
+    raw = raw[strain[raw] > 0]
+    top = raw[np.argmax(friction[raw])]
+    mean = smoothed(strain, friction)
+    best = int(np.nanargmax(mean)) if np.isfinite(mean).any() else top
+    ultimate = friction[strain >= late * strain[-1]]
+    final = dilation[strain >= 0.9 * strain[-1]].mean()
+    swell = smoothed(strain, dilation)
+    reached = np.flatnonzero(swell >= 0.95 * final)
+    return Strength(friction[top], strain[top], mean[best] if np.isfinite(mean[best]) else friction[top], strain[best],
+                    ultimate.mean(), ultimate.std(), final, strain[reached[0]] if len(reached) else np.nan,
+                    dilation.min(), strain[-1], rows["shear_stress"][raw].max())
+
+
+@dataclass(frozen=True)
+class MohrCoulomb:
+    phi: float          # angle of internal friction, degrees
+    C: float            # cohesion, Pa
+    phi_se: float       # asymptotic standard errors
+    C_se: float
+    points: int
+
+    def interval(self, level=0.95):
+        """Half widths of the confidence intervals of phi and C (Student's t)."""
+        t = stats.t.ppf(0.5 + level / 2, self.points - 2)
+        return t * self.phi_se, t * self.C_se
+
+    def tau(self, sigma_0):
+        return self.C + np.asarray(sigma_0) * np.tan(np.radians(self.phi))
+
+
+def mohr_coulomb(sigma_0, tau):
+    """Fits tau = C + sigma_0 tan(phi) (eq. 2) by Levenberg-Marquardt, as in par. 30. Pa. At least three points."""
+    sigma_0, tau = np.asarray(sigma_0, float), np.asarray(tau, float)
+    if len(np.unique(sigma_0)) < 2 or len(tau) < 3:
+        raise ValueError(f"a Mohr-Coulomb line needs at least 3 points at 2 normal stresses, not {len(tau)} at "
+                         f"{len(np.unique(sigma_0))}")
+    scale = sigma_0.max()
+    (C, phi), covariance = optimize.curve_fit(lambda s, C, phi: C + s * np.tan(phi), sigma_0 / scale, tau / scale,
+                                              p0=(0.0, 0.5), method="lm")
+    C_se, phi_se = np.sqrt(np.diag(covariance))
+    return MohrCoulomb(np.degrees(phi), C * scale, np.degrees(phi_se), C_se * scale, len(tau))
