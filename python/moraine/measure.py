@@ -42,6 +42,17 @@ def strengths(case, until=None):
     }
 
 
+def tilt(tensor):
+    """Angle from the vertical of the axis of its largest principal value, degrees."""
+    return 90 - forces.maximum_compressive_direction(tensor)[1]
+
+
+def strong_tilt(snapshot):
+    """Of the mean direction of the strongest half of the contacts (Fig. 7): largest principal axis of their mean n n^T."""
+    n = forces.vector(*forces.trend_plunge(snapshot))
+    return tilt(n.T @ n / len(n))
+
+
 def measure(case):
     """The strengths, and all that takes snapshots."""
     shear, consolidate = case.stage("shear"), case.stage("consolidate")
@@ -68,10 +79,13 @@ def measure(case):
     spin = rotation.statistics(last)
     for axis, mean, variance in zip("xyz", spin.mean, spin.variance):
         out |= {f"rotation_mean_{axis}": mean, f"rotation_variance_{axis}": variance}
+    late = shear.snapshots[len(shear.snapshots) * 2 // 3:]
     out["above_4_consolidated"] = forces.share_above(before, sigma_0)
-    out["above_4_sheared"] = np.mean([forces.share_above(x, sigma_0) for x in shear.snapshots[len(shear.snapshots) * 2 // 3:]])
-    tensor = forces.fabric_tensor(last)
-    out["fabric_zz"] = tensor[2, 2]
+    out["above_4_sheared"] = np.mean([forces.share_above(x, sigma_0) for x in late])
+    out["strong_tilt_consolidated"] = strong_tilt(before)
+    out["strong_tilt_sheared"] = np.mean([strong_tilt(x) for x in late])
+    out["stress_tilt"] = np.mean([tilt(forces.stress_tensor(x)) for x in late])
+    out["applied_tilt"] = np.degrees(np.arctan(out["friction_ultimate"]))
     out["inertia_number"] = compaction.inertia_number(
         shear.settings["strain_rate"], d / 2, case.settings["grains"]["density"], sigma_0)
     return out

@@ -1,0 +1,78 @@
+"""./moraine reproduce NAME: runs the study of cases/NAME/Snakefile, what is missing of it, and ends with figures and a report."""
+from pathlib import Path
+import os
+import re
+import shutil
+import subprocess
+import sys
+
+from . import paper2013
+from .case import MissingData
+
+root = Path(__file__).resolve().parents[2]
+
+
+def studies():
+    return sorted(p.parent.name for p in (root / "cases").glob("*/Snakefile"))
+
+
+def arguments(parser):
+    parser.add_argument("NAME", help=f"a directory in cases/ with a Snakefile: {', '.join(studies())}")
+    parser.add_argument("--preset", default="fast", choices=("paper", "standard", "fast"),
+                        help="accuracy against time (default: %(default)s)")
+    parser.add_argument("--seeds", default="3", help="how many random packings, or which: 4,5,6 (default: %(default)s)")
+    parser.add_argument("--quick", action="store_true", help="1,000 grains instead of 10,000: minutes instead of hours")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="sets",
+                        help="override a key of case.toml, by its full name: --set wall.mass=64kg; makes a study beside the one without. "
+                             "--set normal_stress=30,100kPa: these normal stresses instead of the paper's; the report has all there are")
+    parser.add_argument("--settled", default="", metavar="STUDY",
+                        help="shear the beds that this study has settled (such as fast) instead of settling them again")
+    parser.add_argument("--output", metavar="DIR", help="of the report (default: runs/STUDY/results beside the Snakefile)")
+    parser.add_argument("--cores", type=int, default=os.cpu_count(), help="CPU cores to use (default: all, %(default)s)")
+    parser.add_argument("--gpu", action="store_true", help="on one GPU, all normal stresses of a seed at once")
+    parser.add_argument("--dry-run", action="store_true", help="say what would run")
+
+
+def seeds(text):
+    if not re.fullmatch(r"\d+(,\d+)*", text) or text == "0":
+        raise MissingData(f"--seeds {text}: expected a number of seeds, or seeds with commas between them")
+    return [int(s) for s in text.split(",")] if "," in text else list(range(1, int(text) + 1))
+
+
+def study_of(args):
+    settings, stresses = {}, paper2013.stresses
+    for text in args.sets:
+        key, equals, value = text.partition("=")
+        if not equals or not value:
+            raise MissingData(f"--set {text}: expected KEY=VALUE")
+        if key == "normal_stress":
+            stresses = value if "," in value else value + ","
+        elif key in ("seed", "grains.seed", "preset", "model.preset"):
+            raise MissingData(f"--set {text}: give --{key.rpartition('.')[2].replace('seed', 'seeds')} instead")
+        elif "." not in key:
+            raise MissingData(f"--set {text}: expected the full name of the key, such as wall.mass; ./moraine keys lists them")
+        else:
+            settings[key] = value
+    return paper2013.Study(args.preset, seeds(args.seeds), stresses, args.quick, settings, args.settled,
+                           str(Path(args.output).resolve()) if args.output else "", gpu=args.gpu,
+                           moraine=os.environ.get("MORAINE_LAUNCHER", str(root / "moraine")))
+
+
+def run(args):
+    home = root / "cases" / args.NAME
+    if not (home / "Snakefile").exists():
+        raise MissingData(f"there is no {home.relative_to(root)}/Snakefile; studies: {', '.join(studies())}")
+    snakemake = shutil.which("snakemake")
+    if not snakemake:
+        raise MissingData("snakemake is not installed (Debian: apt-get install snakemake)")
+    study = study_of(args)
+    command = [snakemake, "--snakefile", "Snakefile", "--cores", str(args.cores), "--config", f"study={study.to_config()}",
+               # What has been computed stays valid when only words of the workflow change.
+               "--rerun-triggers", "mtime", "--keep-going", "--rerun-incomplete"]
+    if args.dry_run:
+        command.append("--dry-run")
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [str(root / "python"), os.environ.get("PYTHONPATH")]))}
+    status = subprocess.run(command, cwd=home, env=environment).returncode
+    if status == 0 and not args.dry_run:
+        print(f"report: {home / 'runs' / study.name / 'results' if not args.output else Path(args.output)}/report.html")
+    return status
