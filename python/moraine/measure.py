@@ -53,41 +53,62 @@ def strong_tilt(snapshot):
     return tilt(n.T @ n / len(n))
 
 
-def measure(case):
-    """The strengths, and all that takes snapshots."""
-    shear, consolidate = case.stage("shear"), case.stage("consolidate")
-    sigma_0, d = shear.settings["normal_stress"], case.diameter
-    last, before = shear.snapshots[-1], consolidate.snapshots[-1]
-    out = strengths(case) | {
-        "preset": case.settings["model"]["preset"], "f": shear.settings["f"],
-        "k_n": case.settings["contact"]["k_n"] / case.settings["model"]["softening"], "grains": len(last.grains),
-        "hours": hours(case), "program": case.text.partition("\n")[0].lstrip("# "),
-    }
+def about(case, shear, consolidate):
+    return {"preset": case.settings["model"]["preset"], "f": shear.settings["f"],
+            "k_n": case.settings["contact"]["k_n"] / case.settings["model"]["softening"],
+            "grains": len(shear.snapshots[-1].grains), "hours": hours(case), "program": case.text.partition("\n")[0].lstrip("# "),
+            "inertia_number": compaction.inertia_number(shear.settings["strain_rate"], case.diameter / 2,
+                                                        case.settings["grains"]["density"], shear.settings["normal_stress"])}
+
+
+def consolidation(case, shear, consolidate):
     time, strain = compaction.volumetric_strain(consolidate)
+    out = {"consolidation_strain": strain[-1]}
     try:
         collapse, creep = compaction.phases(time, strain)
         out |= {"collapse_time_s": collapse.time, "collapse_r2": collapse.r_squared, "creep_time_s": creep.time,
                 "creep_r2": creep.r_squared}
     except (RuntimeError, ValueError):  # no such curve fits
-        out |= {name: np.nan for name in ("collapse_time_s", "collapse_r2", "creep_time_s", "creep_r2")}
-    out["consolidation_strain"] = strain[-1]
-    out["shear_zone_d"], out["shear_zone_integral_d"] = profile.shear_zone(last)
+        pass
+    return out
+
+
+def profiles(case, shear, consolidate):
+    last = shear.snapshots[-1]
+    depth, block = profile.shear_zone(last)
     edges, phi = profile.porosity(last)
-    middle = (edges[1:] + edges[:-1]) / 2
-    inner = phi[1:-1]  # the outermost slabs lie at the flat walls
-    out |= {"porosity_max": inner.max(), "porosity_max_below_top_d": (last.top_wall - middle[1:-1][inner.argmax()]) / d}
-    spin = rotation.statistics(last)
-    for axis, mean, variance in zip("xyz", spin.mean, spin.variance):
-        out |= {f"rotation_mean_{axis}": mean, f"rotation_variance_{axis}": variance}
+    middle, inner = (edges[1:-2] + edges[2:-1]) / 2, phi[1:-1]  # the outermost slabs lie at the flat walls
+    return {"shear_zone_d": depth, "shear_zone_integral_d": block, "porosity_max": inner.max(),
+            "porosity_max_below_top_d": (last.top_wall - middle[inner.argmax()]) / case.diameter}
+
+
+def rotations(case, shear, consolidate):
+    spin = rotation.statistics(shear.snapshots[-1])
+    return {f"rotation_{what}_{axis}": value for what, values in (("mean", spin.mean), ("variance", spin.variance))
+            for axis, value in zip("xyz", values)}
+
+
+def force_chains(case, shear, consolidate):
+    """Means over the snapshots of the last third of the shear, since chains come and go."""
+    sigma_0, before = shear.settings["normal_stress"], consolidate.snapshots[-1]
     late = shear.snapshots[len(shear.snapshots) * 2 // 3:]
-    out["above_4_consolidated"] = forces.share_above(before, sigma_0)
-    out["above_4_sheared"] = np.mean([forces.share_above(x, sigma_0) for x in late])
-    out["strong_tilt_consolidated"] = strong_tilt(before)
-    out["strong_tilt_sheared"] = np.mean([strong_tilt(x) for x in late])
-    out["stress_tilt"] = np.mean([tilt(forces.stress_tensor(x)) for x in late])
-    out["applied_tilt"] = np.degrees(np.arctan(out["friction_ultimate"]))
-    out["inertia_number"] = compaction.inertia_number(
-        shear.settings["strain_rate"], d / 2, case.settings["grains"]["density"], sigma_0)
+    rows = shear.series
+    friction = rows["shear_friction"][rows["shear_strain"] >= strength.late * rows["shear_strain"][-1]].mean()
+    return {"above_4_consolidated": forces.share_above(before, sigma_0),
+            "above_4_sheared": np.mean([forces.share_above(x, sigma_0) for x in late]),
+            "strong_tilt_consolidated": strong_tilt(before), "strong_tilt_sheared": np.mean([strong_tilt(x) for x in late]),
+            "stress_tilt": np.mean([tilt(forces.stress_tensor(x)) for x in late]),
+            "applied_tilt": np.degrees(np.arctan(friction))}
+
+
+def measure(case, say=print):
+    """The strengths, and all that can be had from consolidation and snapshots; what lacks data is left out, and said."""
+    out = strengths(case)
+    for part in (about, consolidation, profiles, rotations, force_chains):
+        try:
+            out |= part(case, case.stage("shear"), case.stage("consolidate"))
+        except MissingData as why:
+            say(f"{part.__name__.replace('_', ' ')}: not measured: {why}")
     return out
 
 

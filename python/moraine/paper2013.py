@@ -25,8 +25,11 @@ def stress_names(text):
     return [re.sub(r"\s+", "", p) if re.search(r"[a-zA-Z]$", p) else p + unit for p in parts]
 
 
-def variant_name(key, value):
-    return f"{key.rsplit('.', 1)[-1]}-{re.sub(r'[^A-Za-z0-9.-]+', '', value)}"
+def variant_names(settings):
+    """mass-64kg; with its stage where several keys have the same last word."""
+    last = [key.rpartition(".")[2] for key in settings]
+    return [f"{word if last.count(word) == 1 else key.removeprefix('stage.')}-{re.sub(r'[^A-Za-z0-9.-]+', '', value)}"
+            for word, (key, value) in zip(last, settings.items())]
 
 
 def concerns_bed(key):
@@ -51,7 +54,7 @@ class Study:
 
     @property
     def name(self):
-        return "+".join([self.base] + [variant_name(k, v) for k, v in self.settings.items()])
+        return "+".join([self.base] + variant_names(self.settings))
 
     @property
     def bed(self):
@@ -76,22 +79,35 @@ class Study:
 
     @classmethod
     def from_config(cls, config):
-        """From Snakemake's configuration, in which all is text: study="{...}" as `reproduce` gives it, or single values."""
-        given = json.loads(config["study"]) if "study" in config else {k: v for k, v in config.items() if k in cls.__annotations__}
-        study = cls(**given)
+        """From Snakemake's configuration: any of the fields above, by their names."""
+        study = cls(**{k: v for k, v in config.items() if k in cls.__annotations__})
         study.results = study.results or f"runs/{study.name}/results"
         return study
 
-    def to_config(self):
-        return json.dumps(self.__dict__)
+    def write_config(self, home):
+        """runs/NAME/study.json, for snakemake --configfile; relative to `home`."""
+        file = Path("runs") / self.name / "study.json"
+        (home / file).parent.mkdir(parents=True, exist_ok=True)
+        (home / file).write_text(json.dumps(self.__dict__, indent=1) + "\n")
+        return file
+
+    def write_cases(self):
+        """The case.toml of each case, before anything runs. Those that are there stay; another one in its place is an error."""
+        for directory, text in self.case_files():
+            file = directory / "case.toml"
+            if not file.exists():
+                directory.mkdir(parents=True, exist_ok=True)
+                file.write_text(text)
+            elif file.read_text() != text:
+                raise SystemExit(f"moraine: {file} is not that of this study; move the folder away, or remove it, and try again")
 
     def case_files(self):
-        """(directory, case.toml) of each case that is to be there before anything runs."""
+        """(directory, text of case.toml) of each case."""
         for seed in self.seeds:
             here = Path("runs") / self.name / f"seed-{seed}"
-            if self.bed == self.name:
-                bed = {k: v for k, v in self.settings.items() if concerns_bed(k)}
-                yield here / "settle", self._text("settle", seed, bed)
+            if not self.settled:
+                own = {k: v for k, v in self.settings.items() if concerns_bed(k)}
+                yield Path("runs") / self.bed / f"seed-{seed}" / "settle", self._text("settle", seed, own)
             start = os.path.relpath(Path("runs") / self.bed / f"seed-{seed}" / "settle", here / "shear")
             rest = {k: v for k, v in self.settings.items() if not k.startswith("stage.settle.")}
             yield here / "shear", self._text("shear", seed, rest, f'start = "{start}"\n')
@@ -119,13 +135,3 @@ def toml(value):
     except ValueError:
         return value if value in ("true", "false") else json.dumps(value)
 
-
-def write_case(directory, text):
-    """Leaves alone what is there; that of another study under the same name is an error."""
-    file = Path(directory) / "case.toml"
-    if file.exists():
-        if file.read_text() != text:
-            raise SystemExit(f"moraine: {file} is not that of this study; move the folder away, or remove it, and try again")
-        return
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(text)

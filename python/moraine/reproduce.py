@@ -66,7 +66,7 @@ def run(args):
     if not snakemake:
         raise MissingData("snakemake is not installed (Debian: apt-get install snakemake)")
     study = study_of(args)
-    command = [snakemake, "--snakefile", "Snakefile", "--cores", str(args.cores), "--config", f"study={study.to_config()}",
+    command = [snakemake, "--snakefile", "Snakefile", "--cores", str(args.cores), "--configfile", str(study.write_config(home)),
                # What has been computed stays valid when only words of the workflow change.
                "--rerun-triggers", "mtime", "--keep-going", "--rerun-incomplete"]
     if args.dry_run:

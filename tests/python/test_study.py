@@ -1,0 +1,130 @@
+"""The study of the paper: where its runs lie, what they are, and the words of its report."""
+import tomllib
+
+import numpy as np
+import pytest
+
+from moraine import report
+from moraine.case import MissingData
+from moraine.paper2013 import Study, stress_names
+from moraine.reproduce import seeds
+
+
+def test_names_are_those_of_a_sweep():
+    assert stress_names("10,20 kPa") == ["10kPa", "20kPa"]
+    assert stress_names("80 kPa,") == ["80kPa"]
+    assert stress_names("10 kPa, 1 bar") == ["10kPa", "1bar"]
+
+
+def test_a_study_and_its_cases():
+    study = Study(seeds=[4])
+    cases = {str(d): tomllib.loads(text) for d, text in study.case_files()}
+    assert cases == {
+        "runs/fast/seed-4/settle": {"extends": "../../../../settle", "model": {"preset": "fast"}, "grains": {"seed": 4}},
+        "runs/fast/seed-4/shear": {"extends": "../../../../shear", "start": "../settle", "model": {"preset": "fast"},
+                                   "grains": {"seed": 4}}}
+
+
+def test_a_variant_shares_the_settled_bed():
+    study = Study(seeds=[1], settings={"wall.mass": "64 kg", "stage.shear.clear_history": "true"})
+    assert study.name == "fast+mass-64kg+clear_history-true"
+    cases = {str(d): tomllib.loads(text) for d, text in study.case_files()}
+    assert set(cases) == {"runs/fast/seed-1/settle", f"runs/{study.name}/seed-1/shear"}
+    assert cases["runs/fast/seed-1/settle"].keys() == {"extends", "model", "grains"}
+    shear = cases[f"runs/{study.name}/seed-1/shear"]
+    assert shear["start"] == "../../../fast/seed-1/settle"
+    assert shear["wall"] == {"mass": "64 kg"} and shear["stage"] == [{"name": "shear", "clear_history": True}]
+
+
+def test_a_variant_of_the_bed_settles_its_own():
+    study = Study(seeds=[1], settings={"stage.settle.mu_s": "0.1"})
+    cases = {str(d): tomllib.loads(text) for d, text in study.case_files()}
+    assert cases[f"runs/{study.name}/seed-1/settle"]["stage"] == [{"name": "settle", "mu_s": 0.1}]
+    assert cases[f"runs/{study.name}/seed-1/shear"]["start"] == "../settle"
+    assert "stage" not in cases[f"runs/{study.name}/seed-1/shear"]
+
+
+def test_the_same_word_twice_keeps_its_stage():
+    study = Study(settings={"stage.consolidate.mu_s": "0.1", "stage.shear.mu_s": "0.3"})
+    assert study.name == "fast+consolidate.mu_s-0.1+shear.mu_s-0.3"
+
+
+def test_beds_of_another_study():
+    study = Study(preset="paper", seeds=[1], settled="fast")
+    (directory, text), = study.case_files()
+    assert str(directory) == "runs/paper/seed-1/shear" and 'start = "../../../fast/seed-1/settle"' in text
+
+
+def test_a_case_of_another_study_is_not_overwritten(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    study = Study(seeds=[1])
+    study.write_cases()
+    study.write_cases()
+    file = tmp_path / "runs/fast/seed-1/settle/case.toml"
+    file.write_text("title = 'mine'\n")
+    with pytest.raises(SystemExit, match="is not that of this study"):
+        study.write_cases()
+    assert file.read_text() == "title = 'mine'\n"
+
+
+def test_the_configuration_survives_being_written(tmp_path):
+    import json
+    study = Study(seeds=[1, 2], quick=True, settings={"wall.mass": "64 kg"})
+    file = study.write_config(tmp_path)
+    assert Study.from_config(json.loads((tmp_path / file).read_text())).name == study.name == "quick+mass-64kg"
+
+
+def test_seeds():
+    assert seeds("3") == [1, 2, 3] and seeds("4,7") == [4, 7]
+    for wrong in ("0", "a", "1,", "-1"):
+        with pytest.raises(MissingData, match="--seeds"):
+            seeds(wrong)
+
+
+def rows(phi=30.0, C=1e3, noise=0.0, count=3):
+    rng = np.random.default_rng(2)
+    return [{"seed": s, "sigma_0_kPa": sigma, "friction_peak": (C / sigma / 1e3 + np.tan(np.radians(phi))) + noise * rng.normal(),
+             "friction_peak_raw": 0.7 + 0.01 * rng.normal(), "friction_ultimate": 0.35 + 0.003 * rng.normal(), "strain_peak": 0.01 * sigma + 0.01 * rng.normal(),
+             "strain_dilated": 0.3 + 0.01 * rng.normal(), "dilation_d": 0.75 + 1e-3 * s, "rotation_mean_x": -0.003 + 0.01 * rng.normal()}
+            for s in range(1, count + 1) for sigma in (10.0, 20.0, 40.0, 60.0, 80.0, 120.0)]
+
+
+def find(lines, start):
+    return next(x for x in lines if x.quantity.startswith(start))
+
+
+def test_verdicts_follow_the_numbers():
+    lines = report.quantities(rows(phi=32.1, noise=0.003))
+    assert find(lines, "φ_p (smoothed)").verdict == "agrees"
+    assert find(lines, "φ_u").verdict == "lower"
+    lines = report.quantities(rows(phi=40.0, noise=0.003))
+    assert find(lines, "φ_p (smoothed)").verdict == "higher"
+    assert find(lines, "strain at the smoothed peak").verdict == "holds"
+    assert find(lines, "strain until dilation").verdict == "no trend to be seen"
+    assert find(lines, "dilation at 80 kPa").verdict == "agrees"
+    assert find(lines, "mean of the rotation about x").verdict == "agrees"
+
+
+def test_one_run_gives_no_interval():
+    lines = report.quantities(rows(count=1))
+    assert find(lines, "dilation at 80 kPa").verdict == "no interval"
+
+
+def test_what_was_not_measured_is_left_out():
+    lines = report.quantities(rows())
+    assert not [x for x in lines if "4 σ_0" in x.quantity or "shear zone at" in x.quantity]
+    assert find(lines, "shear zone (5 %").verdict == "not tested"
+
+
+def test_mean_and_interval():
+    mean, half = report.mean_interval([1.0, 2.0, 3.0])
+    assert mean == 2.0 and half == pytest.approx(4.30265 / np.sqrt(3), rel=1e-5)
+    assert np.isnan(report.mean_interval([1.0])[1])
+
+
+def test_table_survives_being_written(tmp_path):
+    from moraine import measure
+    file = tmp_path / "m.csv"
+    measure.table(rows(), file)
+    again = measure.read_table(file)
+    assert again[0]["sigma_0_kPa"] == 10 and again[-1]["strain_peak"] == pytest.approx(rows()[-1]["strain_peak"], rel=1e-5)
