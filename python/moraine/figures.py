@@ -65,7 +65,7 @@ all_figures = (
            "top wall are left out.", lambda s: bed_figures.porosity(s.cases)),
     Figure("fig10-section", "Vertical section through the upper part of the bed at three times close to each other (Fig. 10): contact pressure, "
            "rotation (black arrows), velocity (white), slip at contacts (green). Grains that spin along with the shear have a black rim.",
-           lambda s: force_figures.section(s.shear.snapshots[-3:])),
+           lambda s: force_figures.section(s.shear.snapshots[-3:], s.one.normal_stress)),
     Figure("fig11-rotation", "Rotation of each free grain since shear began, about each axis (Fig. 11). Plus: mean.",
            lambda s: bed_figures.rotations(s.sheared)),
     Figure("fig13-laboratory", "Shear stress and dilation beside what the paper's text states of real materials (Fig. 13, Table 2, par. 52).",
