@@ -131,9 +131,10 @@ class Stage:
 
     @cached_property
     def snapshots(self):
-        found = sorted((self.case.output / "snapshots").glob(f"{self.index:02d}-{self.name}-*.h5"))
+        pattern = f"{self.index + 1:02d}-{self.name}-*.h5"  # files count stages from 1, the series from 0
+        found = sorted((self.case.output / "snapshots").glob(pattern))
         if not found:
-            raise MissingData(f"{self.case.output}/snapshots: there is no snapshot {self.index:02d}-{self.name}-*.h5")
+            raise MissingData(f"{self.case.output}/snapshots: there is no snapshot {pattern}")
         return [Snapshot(f) for f in found]
 
     @property
