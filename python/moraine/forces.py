@@ -1,8 +1,8 @@
-"""Contact forces: the force network, how forces are distributed, their directions, fabric and stress (pars. 31, 34, 44; Figs. 5-7).
+"""Contact forces: their network, distribution, directions, fabric and stress (pars. 31, 34, 44; Figs. 5-7).
 
 A free contact is one between two free grains (role 0): the "nonfixed particles" of Fig. 6. Contacts with walls are not in a
-snapshot's contacts; a grain's pressure has them. Directions are axes, told by their end in the lower hemisphere: the trend is the
-angle of its horizontal part from +x towards +y (0 to 360 degrees), the plunge its angle below the horizontal (0 to 90 degrees).
+snapshot's contacts; a grain's pressure has them. Directions are axes, told by their end in the lower hemisphere: the trend is
+the angle of its horizontal part from +x towards +y (0 to 360 degrees), the plunge that below the horizontal (0 to 90 degrees).
 """
 from dataclasses import dataclass
 
@@ -20,6 +20,13 @@ def free_contacts(snapshot):
     return both
 
 
+def strongest_contacts(snapshot, share):
+    """Rows of that share of the free contacts that carries the largest |f_n|, strongest first."""
+    free = np.flatnonzero(free_contacts(snapshot))
+    order = np.argsort(snapshot.normal_forces()[free], kind="stable")[::-1]
+    return free[order[:round(share * len(free))]]
+
+
 # The network (Fig. 6).
 
 @dataclass
@@ -30,10 +37,10 @@ class Network:
 
 
 def network(snapshot, y=None, thickness=None):
-    """Free contacts whose point lies within thickness / 2 of the plane y, as segments between the centres of their grains (Fig. 6).
+    """Free contacts whose point lies within thickness / 2 of the plane y, as segments between the grains' centres (Fig. 6).
 
-    Both in m; by default the middle of the box, and three mean diameters. A segment that crosses a side in x is cut there, and its
-    rest begins at the other side."""
+    Both in m; by default the middle of the box, and three mean diameters. A segment that crosses a side in x is cut there, and
+    its rest begins at the other side."""
     lx, ly = snapshot.box[:2]
     y = ly / 2 if y is None else y
     thickness = 6 * snapshot.grains["radius"].mean() if thickness is None else thickness
@@ -117,9 +124,7 @@ def normals(snapshot, which):
 
 def trend_plunge(snapshot, strongest=0.5):
     """Trend and plunge, degrees, of the normals of that share of the free contacts that carries the largest |f_n| (Fig. 7)."""
-    free = np.flatnonzero(free_contacts(snapshot))
-    order = np.argsort(snapshot.normal_forces()[free], kind="stable")[::-1]
-    return axis(normals(snapshot, free[order[:round(strongest * len(free))]]))
+    return axis(normals(snapshot, strongest_contacts(snapshot, strongest)))
 
 
 def stereographic(trend, plunge):
@@ -161,8 +166,8 @@ def fabric_tensor(snapshot, weights=None):
 def bulk(snapshot):
     """Heights, m, between which all stress is carried by contacts between grains.
 
-    From the highest centre of the lower layer to the lowest of the driven one; without layers, from the floor to the top wall less the
-    largest radius at each, which leaves out what contacts with the walls carry."""
+    From the highest centre of the lower layer to the lowest of the driven one; without layers, from the floor to the top wall
+    less the largest radius at each, which leaves out what contacts with the walls carry."""
     z, role, r = snapshot.grains["position"][:, 2], snapshot.grains["role"], snapshot.grains["radius"].max()
     low = z[role == 1].max() if (role == 1).any() else r
     wall = snapshot.top_wall if np.isfinite(snapshot.top_wall) and snapshot.top_wall > 0 else np.inf
@@ -175,8 +180,9 @@ def stress_tensor(snapshot, z_range=None):
 
     f = f_n + f_t acts on i, x_ij points from j to i: compression is positive. A top layer dragged along +x makes the xz component
     negative (the upper grain is held back by the lower), about -tau. V is the box's area times the height of z_range (m; default:
-    bulk()). A contact counts with the share of its branch that lies between these heights, so zz, xz and yz are what horizontal planes
-    carry, averaged over them exactly. Not symmetric to the last digit where grains gain spin; principal() takes the symmetric part."""
+    bulk()). A contact counts with the share of its branch that lies between these heights, so zz, xz and yz are exactly the mean
+    of what the horizontal planes there carry: zz is sigma' and the weight above. Where grains gain spin it is not symmetric to the
+    last digit; principal() takes the symmetric part."""
     low, high = bulk(snapshot) if z_range is None else z_range
     branch, c = snapshot.branches(), snapshot.contacts
     top = snapshot.grains["position"][c["i"], 2]
@@ -205,7 +211,8 @@ def applied_compressive_direction(tau, sigma):
     """Trend and plunge, degrees, of the paper's "maximum compressive stress (sigma' + tau)": the white plus of Fig. 7.
 
     It is the sum of what the top does to the bed, sigma' straight down and tau along +x: vertical in consolidation, then inclined by
-    atan(tau / sigma') from the vertical, dipping towards +x, where the top layer moves. The principal direction of the stress
-    tensor dips the same way, but less steeply: at 45 degrees where horizontal and vertical stress are equal."""
+    atan(tau / sigma') from the vertical, dipping towards +x, where the top layer moves: grains that it pushes carry force along
+    +x and down. The principal direction of the stress tensor dips the same way, but less steeply: at 45 degrees where horizontal
+    and vertical stress are equal."""
     trend, plunge = axis([tau, 0.0, -sigma])
     return float(trend), float(plunge)
