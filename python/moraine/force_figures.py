@@ -1,4 +1,4 @@
-"""Figures of forces and of moving grains: Figs. 5, 6, 7 and 10 of the paper, force distributions, and the picture of a sheared bed.
+"""Figures of forces and of moving grains: Figs. 5, 6, 7 and 10 of the paper, force distributions, and a sheared bed.
 
 Each function returns a matplotlib Figure. Snapshots are those of moraine.case; stresses in Pa.
 """
@@ -18,12 +18,16 @@ from .style import column, ink, lines, page, panel, plt, sequential
 
 fixed_grey = (0.72, 0.72, 0.72, 1)
 strong_is_dark = sequential.reversed()  # on white paper
+warm = plt.matplotlib.colors.ListedColormap(plt.get_cmap("YlOrBr")(np.linspace(0.03, 0.72, 256)))  # black, white, green stand out
+white, green = ("1", 0.014), ("#2fd14f", 0.013)  # colour, width in inches
+straight = {"angles": "xy", "scale_units": "xy", "units": "inches", "headwidth": 4, "headlength": 4.5, "headaxislength": 4,
+            "minshaft": 1.8}
 
 
-def rounded(value, up=False):
-    """To 1, 2 or 5 times a power of ten: the nearest, or the next one up."""
+def rounded(value):
+    """To the nearest of 1, 2 or 5 times a power of ten."""
     choices = np.array([1, 2, 5, 10]) * 10.0 ** np.floor(np.log10(value))
-    return float(choices[choices >= value * (1 - 1e-9)][0] if up else choices[np.abs(np.log(choices / value)).argmin()])
+    return float(choices[np.abs(np.log(choices / value)).argmin()])
 
 
 def outlined(width=1.6, colour="0"):
@@ -37,7 +41,7 @@ def box_edges(snapshot, x, r):
     return [(p * size, q * size) for p in corners for q in corners if (q - p).min() >= 0 and (q - p).sum() == 1]
 
 
-def pressure_3d(snapshot, sigma_0, strong=2, upper=4):
+def pressure_3d(snapshot, sigma_0, strong=3, upper=5):
     """Grain pressure over sigma_0 in the bed, and the free grains above `strong` alone (Fig. 5). Fixed grains are grey."""
     g = snapshot.grains
     x, r, free = g["position"], g["radius"], g["role"] == 0
@@ -46,20 +50,29 @@ def pressure_3d(snapshot, sigma_0, strong=2, upper=4):
     chosen = free & (share > strong)
 
     figure, axes = plt.subplots(1, 2, figsize=(page, 3.25))
-    figure.subplots_adjust(left=0.0, right=0.9, top=0.9, bottom=0.02, wspace=0.03)
+    figure.subplots_adjust(left=0.0, right=0.86, top=0.9, bottom=0.02, wspace=0.03)
     corners = np.array(box_edges(snapshot, x, r)).reshape(-1, 3)
     frame = np.concatenate([x, corners]), np.concatenate([r, np.zeros(len(corners))])
-    titles = "free grains by pressure, fixed grains grey", f"only above {strong:g} $\\sigma_0$: {100 * chosen.sum() / free.sum():.0f} % of the free grains"
+    titles = ("free grains by pressure" + ", fixed ones grey" * bool((~free).any()),
+              f"above {strong:g} $\\sigma_0$ only: {100 * chosen.sum() / free.sum():.0f} % of the free grains")
     for axes_, which, letter, title in zip(axes, (np.ones(len(x), bool), chosen), "ab", titles):
         image, place = spheres.render(x[which], r[which], colour[which], pixels=1500, frame=frame)
         axes_.imshow(image, interpolation="antialiased", zorder=2)
+        axes_.set(xlim=(0, image.shape[1]), ylim=(image.shape[0], 0))
         axes_.set_axis_off()
         panel(axes_, letter)
         axes_.set_title(title, pad=4)
+    hidden = snapshot.box * (1, 1, 0)  # the corner behind everything
     for p, q in box_edges(snapshot, x, r):
-        axes[1].plot(*np.transpose([place(p), place(q)]), color="0.6", lw=0.6, zorder=1)
+        seen = not (np.allclose(p, hidden) or np.allclose(q, hidden))
+        axes[1].plot(*np.transpose([place(p), place(q)]), color="0.45", lw=0.6, ls="-" if seen else ":",
+                     zorder=3 if seen else 1, clip_on=False)
+    lx, ly, top = corners.max(axis=0)
+    for at, length, offset in (((lx / 2, 0, 0), lx, (3, -4)), ((0, ly / 2, 0), ly, (-3, -4)), ((lx, 0, top / 2), top, (3, 0))):
+        axes[1].annotate(f"{length:.2f} m", place(np.array(at)), offset, textcoords="offset points", fontsize=7,
+                         ha="left" if offset[0] > 0 else "right", va="top" if offset[1] else "center", annotation_clip=False)
     bar = figure.colorbar(plt.cm.ScalarMappable(Normalize(0, upper), spheres.colour_map()), extend="max", ax=axes,
-                          cax=figure.add_axes([0.915, 0.2, 0.014, 0.55]))
+                          cax=figure.add_axes([0.93, 0.2, 0.014, 0.55]))
     bar.set_label("grain pressure over $\\sigma_0$")
     bar.set_ticks(range(upper + 1))
     return figure
@@ -86,7 +99,8 @@ def force_network(consolidated, sheared, y=None, thickness=None):
         panel(a, letter)
     axes[0].set_title("consolidation", pad=4)
     axes[1].set_title("shear", pad=4)
-    axes[1].annotate("", (0.98, 1.05), (0.7, 1.05), xycoords="axes fraction", arrowprops={"arrowstyle": "-|>", "color": ink, "lw": 1.2})
+    axes[1].annotate("$u$", (1.0, 1.05), (0.7, 1.05), xycoords="axes fraction", ha="right", va="center",
+                     arrowprops={"arrowstyle": "-|>", "color": ink, "lw": 1.2})
     axes[1].set_xlabel("x (m)")
     bar = figure.colorbar(axes[0].collections[0], cax=figure.add_axes([0.83, 0.25, 0.03, 0.5]), extend="max")
     bar.set_label(f"$|f_n|$ ({name}); {above:.1f} % are above {upper / unit:g} {name}")
@@ -108,8 +122,8 @@ def stereonets(consolidated, sheared, tau, sigma, strongest=0.5):
     levels = MaxNLocator(10).tick_values(0, upper)
     levels = levels[(levels >= 0)]
 
-    figure, axes = plt.subplots(1, 2, figsize=(page * 0.8, 3.1))
-    figure.subplots_adjust(left=0.03, right=0.84, top=0.88, bottom=0.14, wspace=0.16)
+    figure, axes = plt.subplots(1, 2, figsize=(page * 0.8, 2.95))
+    figure.subplots_adjust(left=0.03, right=0.84, top=0.88, bottom=0.1, wspace=0.16)
     for a, s, m, letter, applied, title in zip(axes, (consolidated, sheared), maps, "ab", ((0, sigma), (tau, sigma)),
                                                ("consolidation", "shear")):
         rim = Circle((0, 0), 1, fill=False, ec=ink, lw=0.8, zorder=4)
@@ -129,11 +143,9 @@ def stereonets(consolidated, sheared, tau, sigma, strongest=0.5):
         a.annotate("x", (1.03, 0), va="center", annotation_clip=False)
         a.annotate("y", (0, 1.03), ha="center", annotation_clip=False)
         panel(a, letter)
-        a.set_title(title, pad=12)
-    for height, way in ((0.99, 1), (-0.99, -1)):  # the top moves along +x, the bottom the other way beside it
-        x = np.array([0.5, 0.95]) * way
-        axes[1].annotate("", (x[1], height), (x[0], height), annotation_clip=False,
-                         arrowprops={"arrowstyle": "-|>", "color": ink, "lw": 1.2})
+        a.set_title(title, pad=10)
+    axes[1].annotate("$u$", (1.05, -0.98), (0.7, -0.98), ha="right", va="center", annotation_clip=False,
+                     arrowprops={"arrowstyle": "-|>", "color": ink, "lw": 1.2})
     bar = figure.colorbar(drawn, cax=figure.add_axes([0.87, 0.22, 0.018, 0.58]))
     bar.set_label("density of axes\n(multiples of uniform)")
     keys = [Line2D([], [], ls="", marker="P", ms=7, mfc="1", mec="0", mew=0.8, label="applied: $\\sigma'$ down + $\\tau$ along x"),
@@ -143,82 +155,132 @@ def stereonets(consolidated, sheared, tau, sigma, strongest=0.5):
 
 
 def force_distribution(snapshots, labels, sigma_0, factor=4):
-    """How normal forces and grain pressures are distributed, with the exponential tail and the share above factor sigma_0 (par. 31)."""
+    """Distributions of normal forces, with an exponential tail, and of grain pressures, with the share above factor sigma_0.
+
+    One curve for each snapshot, named by its label. Bins with fewer than three values are left out; the dashed tail is that of the
+    last snapshot. Par. 31."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(page, 2.7))
     figure.subplots_adjust(left=0.08, right=0.98, top=0.9, bottom=0.16, wspace=0.28)
     for s, label, look in zip(snapshots, labels, lines(len(snapshots))):
         d = forces.distribution(s, sigma_0)
-        look = look | {"markersize": 2.5, "linewidth": 0.9}
         beta, error = forces.exponential_tail(d.force)
-        centres, density = d.density(d.force, upper=max(8.0, d.force.max()))
-        shown = density > 0
-        left.plot(centres[shown], density[shown], **look, label=f"{label}: $\\beta$ = {beta:.2f} $\\pm$ {error:.2f}")
-        centres, density = d.density(d.pressure, upper=max(8.0, d.pressure.max()))
-        shown = density > 0
         share = 100 * forces.share_above(s, sigma_0, factor)
-        right.plot(centres[shown], density[shown], **look, label=f"{label}: {share:.1f} % above {factor:g} $\\sigma_0$")
+        names = f"{label}: $\\beta$ = {beta:.2f} $\\pm$ {error:.2f}", f"{label}: {share:.1f} %"
+        for a, values, name in zip((left, right), (d.force, d.pressure), names):
+            bins = int(np.ceil(values.max() / 0.25))
+            centres, density = d.density(values, bins, bins * 0.25)
+            shown = density * len(values) * 0.25 > 2.5  # at least three values in a bin
+            a.plot(centres[shown], density[shown], **look | {"markersize": 2.5, "linewidth": 0.9}, label=name)
+    for a in (left, right):
+        a.set(yscale="log", xlim=0, ylabel="probability density")
+        low, high = a.get_ylim()
+        a.set_ylim(low, high * (high / low)**0.45)  # room for the legend
     tail = np.array([1.5, left.get_xlim()[1]])
     left.plot(tail, np.exp(-beta * (tail - 1.5)) * np.mean(d.force > 1.5) * beta, color="0.4", lw=0.7, ls="--", zorder=0)
-    right.axvline(factor, color="0.4", lw=0.7, ls="--", zorder=0)
-    left.set(yscale="log", xlim=0, xlabel="normal force over its mean, $f/\\langle f \\rangle$", ylabel="probability density")
-    right.set(yscale="log", xlim=0, xlabel="grain pressure over $\\sigma_0$", ylabel="probability density")
-    left.legend(title="tail $\\propto \\exp(-\\beta f/\\langle f \\rangle)$ above 1.5", title_fontsize=7)
-    right.legend()
+    right.axvline(factor, ymax=0.66, color="0.4", lw=0.7, ls="--", zorder=0)
+    left.set_xlabel("normal force over its mean, $f/\\langle f \\rangle$")
+    right.set_xlabel("grain pressure over $\\sigma_0$")
+    left.legend(title="tail $\\propto \\exp(-\\beta f/\\langle f \\rangle)$ above 1.5", title_fontsize=7, loc="upper right")
+    right.legend(title=f"share above {factor:g} $\\sigma_0$", title_fontsize=7, loc="upper right")
     panel(left, "a")
     panel(right, "b")
     return figure
 
 
-def turning(centre, radius, angle):
-    """An arrow along a circle, from its top: clockwise, as seen from -y, for a positive angle (rad)."""
-    t = np.pi / 2 - np.linspace(0, angle, 24) + angle / 2
-    path = Path(centre + radius * np.column_stack([np.cos(t), np.sin(t)]))
-    return FancyArrowPatch(path=path, arrowstyle="-|>", mutation_scale=4, lw=0.7, color="0", shrinkA=0, shrinkB=0)
-
-
 def section(snapshots, sigma_0, y=None, z_range=None, labels=None, upper=4):
     """Grains in a vertical plane at several times (Fig. 10): pressure, velocity, spin about y, and slip at contacts.
 
-    z_range: m; by default the upper ten mean diameters. A curved arrow shows how far a disc turns in the time stated."""
+    z_range: m; by default the upper eight mean diameters. A curved arrow shows how far a disc turns in the time stated. Arrows
+    much longer than those of the key are cut, as a rattler's slip would hide the others."""
     diameter = 2 * snapshots[0].grains["radius"].mean()
     if z_range is None:
         top = max(s.grains["position"][:, 2].max() for s in snapshots)
-        z_range = max(top - 9.5 * diameter, 0), top
+        z_range = max(top - 7 * diameter, 0), top
     cuts = [sections.section(s, y, z_range) for s in snapshots]
     labels = labels or [f"t = {s.stage_time:.2f} s" for s in snapshots]
-    speed, spin, slip = (np.concatenate(q) for q in zip(*(
-        (np.linalg.norm(c.velocity, axis=1), np.abs(c.spin), np.linalg.norm(c.slip, axis=1)) for c in cuts)))
-    speed, slip = (rounded(max(np.percentile(q, 95), 1e-12)) if len(q) else 1.0 for q in (speed, slip))
-    turn = rounded(np.radians(150) / max(np.percentile(spin, 95), 1e-12))  # s
 
-    width, low, high = cuts[0].width, z_range[0] - diameter / 2, z_range[1] + diameter / 2
-    each = 6.0 * (high - low) / width
-    figure, axes = plt.subplots(len(cuts), 1, figsize=(page, len(cuts) * (each + 0.25) + 0.75), sharex=True, squeeze=False)
-    tall = figure.get_figheight()
-    figure.subplots_adjust(left=0.075, right=0.9, top=1 - 0.6 / tall, bottom=0.4 / tall, hspace=0.25 / each)
-    length = 1.1 * diameter  # of the arrows in the key
-    for a, cut, label, letter in zip(axes[:, 0], cuts, labels, "abcdefgh"):
-        norm = Normalize(0, upper)
-        discs = PatchCollection([Circle(c, r) for c, r in zip(cut.centre, cut.radius)], cmap=spheres.colour_map(), norm=norm,
-                                array=cut.pressure / sigma_0, linewidths=np.where(cut.spin > 0, 1.1, 0.0),
-                                edgecolors=np.where((cut.spin > 0)[:, None], (0, 0, 0, 1), (1, 1, 1, 0)))
-        a.add_collection(discs)
-        for c, r, w in zip(cut.centre, cut.radius, cut.spin):
-            angle = np.clip(w * turn, -5, 5)
-            if abs(angle) > 0.25 and r > 0.25 * diameter:
-                a.add_patch(turning(c, 0.62 * r, angle))
-        arrows = {"angles": "xy", "scale_units": "xy", "headwidth": 4, "headlength": 4, "headaxislength": 3.6}
-        moving = a.quiver(*cut.centre.T, *cut.velocity.T, color="1", scale=speed / length, width=0.0022, zorder=3, **arrows)
-        moving.set_path_effects(outlined(1.0, "0.1"))
-        slips = a.quiver(*cut.point.T, *cut.slip.T, color="#39d353", scale=slip / length, width=0.0018, zorder=4, **arrows)
-        slips.set_path_effects(outlined(0.9, "0.15"))
-        a.set(xlim=(0, width), ylim=(low, high), aspect="equal", ylabel="z (m)")
-        panel(a, letter)
+    def typical(values, percent):
+        values = np.concatenate(values)
+        return rounded(max(np.percentile(values, percent), 1e-9)) if len(values) else 1.0
+
+    scales = {"speed": typical([np.linalg.norm(c.velocity, axis=1) for c in cuts], 95),  # m/s
+              "slip": typical([np.linalg.norm(c.slip, axis=1) for c in cuts], 95),       # m/s
+              "turn": rounded(2.5 / typical([np.abs(c.spin) for c in cuts], 85)),        # s
+              "length": 1.2 * diameter}                                                  # m, of an arrow of the key
+
+    width, low, high = cuts[0].width, z_range[0] - 0.6 * diameter, z_range[1] + 0.6 * diameter
+    rows, columns = (len(cuts), 1) if width > 1.5 * (high - low) else (1, len(cuts))
+    left, right, gap = 0.5, 0.65, 0.3  # inches
+    wide = (page - left - right - gap * (columns - 1)) / columns
+    tall = wide * (high - low) / width
+    height = rows * (tall + gap) + 0.85
+    figure = plt.figure(figsize=(page, height))
+    for k, (cut, label) in enumerate(zip(cuts, labels)):
+        row, place = k // columns, k % columns
+        a = figure.add_axes([(left + place * (wide + gap)) / page, (0.4 + (rows - 1 - row) * (tall + gap)) / height, wide / page,
+                             tall / height])
+        discs = draw_section(a, cut, sigma_0, upper, diameter, **scales)
+        a.set(xlim=(0, width), ylim=(low, high))
+        a.tick_params(labelbottom=row == rows - 1, labelleft=place == 0)
+        a.set_xlabel("x (m)" if row == rows - 1 else "")
+        a.set_ylabel("z (m)" if place == 0 else "")
+        panel(a, "abcdefgh"[k])
         a.set_title(label, pad=4)
-    axes[-1, 0].set_xlabel("x (m)")
-    bar = figure.colorbar(discs, cax=figure.add_axes([0.925, 0.3, 0.014, 0.4]), extend="max")
+    middle = (0.4 + (rows * (tall + gap) - gap) / 2) / height
+    place = [1 - 0.5 / page, middle - 0.7 / height, 0.1 / page, 1.4 / height]
+    bar = figure.colorbar(discs, extend="max", cax=figure.add_axes(place))
     bar.set_label("grain pressure over $\\sigma_0$")
+    section_key(figure.add_axes([left / page, 1 - 0.4 / height, 1 - (left + right) / page, 0.36 / height]), width / wide, diameter,
+                **scales)
     return figure
+
+
+def arrows(axes, places, vectors, key, length, colour, thick):
+    """Straight arrows, `length` (m) for a vector of size `key`; none where they would be mere heads, cut at 1.5 lengths."""
+    size = np.linalg.norm(vectors, axis=1, keepdims=True)
+    seen = size[:, 0] > 0.2 * key
+    v = (vectors * np.minimum(1, 1.5 * key / np.maximum(size, 1e-30)))[seen]
+    drawn = axes.quiver(*places[seen].T, *v.T, color=colour, scale=key / length, width=thick, zorder=4, **straight)
+    drawn.set_path_effects(outlined(0.9, "0"))
+
+
+def turning(centre, radius, angle):
+    """An arrow along a circle, half of it to each side of the top: clockwise, as seen from -y, for a positive angle (rad)."""
+    t = np.pi / 2 + angle / 2 - np.linspace(0, angle, 24)
+    path = Path(centre + radius * np.column_stack([np.cos(t), np.sin(t)]))
+    return FancyArrowPatch(path=path, arrowstyle="-|>", mutation_scale=4.5, lw=0.8, color="0", shrinkA=0, shrinkB=0, zorder=3)
+
+
+def draw_section(axes, cut, sigma_0, upper, diameter, speed, slip, turn, length):
+    positive = cut.spin > 0
+    discs = PatchCollection([Circle(c, r) for c, r in zip(cut.centre, cut.radius)], cmap=warm, norm=Normalize(0, upper),
+                            array=cut.pressure / sigma_0, linewidths=np.where(positive, 1.2, 0.3),
+                            edgecolors=np.where(positive[:, None], (0, 0, 0, 1), (0.6, 0.6, 0.6, 1)))
+    axes.add_collection(discs)
+    for c, r, w in zip(cut.centre, cut.radius, cut.spin):
+        angle = np.clip(w * turn, -5, 5)
+        if abs(angle) > 0.7 and r > 0.25 * diameter:
+            axes.add_patch(turning(c, 0.65 * r, angle))
+    arrows(axes, cut.centre, cut.velocity, speed, length, *white)
+    arrows(axes, cut.point, cut.slip, slip, length, *green)
+    return discs
+
+
+def section_key(axes, metre_per_inch, diameter, speed, slip, turn, length):
+    """What the marks of a section mean, to the scale of its panels."""
+    wide, tall = axes.get_position().width * page * metre_per_inch, 0.36 * metre_per_inch
+    axes.set(xlim=(0, wide), ylim=(-tall / 2, tall / 2))
+    axes.set_axis_off()
+    r, gap = min(diameter / 2, 0.45 * tall), 0.08 * metre_per_inch
+    middle = np.array([length / 2, 0])
+    marks = ((f"velocity {1e3 * speed:g} mm/s", lambda at: arrows(axes, at[None], np.array([[speed, 0]]), speed, length, *white)),
+             (f"slip {1e3 * slip:g} mm/s", lambda at: arrows(axes, at[None], np.array([[slip, 0]]), slip, length, *green)),
+             ("spin > 0 about y", lambda at: axes.add_patch(Circle(at + middle, r, fc=warm(0), ec="0", lw=1.2))),
+             (f"turn in {turn:g} s", lambda at: axes.add_patch(turning(at + middle - (0, 0.3 * r), 0.9 * r, 2.5))))
+    for k, (text, draw) in enumerate(marks):
+        at = np.array([k * wide / 4, 0])
+        draw(at)
+        axes.text(at[0] + length + gap, 0, text, fontsize=7, va="center")
 
 
 def sheared_bed(case):
