@@ -41,7 +41,7 @@ def box_edges(snapshot, x, r):
     return [(p * size, q * size) for p in corners for q in corners if (q - p).min() >= 0 and (q - p).sum() == 1]
 
 
-def pressure_3d(snapshot, sigma_0, strong=3, upper=6):
+def pressure_3d(snapshot, sigma_0, strong=3, upper=5):
     """Grain pressure over sigma_0 in the bed, and the free grains above `strong` alone (Fig. 5). Fixed grains are grey."""
     g = snapshot.grains
     x, r, free = g["position"], g["radius"], g["role"] == 0
@@ -50,7 +50,7 @@ def pressure_3d(snapshot, sigma_0, strong=3, upper=6):
     chosen = free & (share > strong)
 
     figure, axes = plt.subplots(1, 2, figsize=(page, 3.25))
-    figure.subplots_adjust(left=0.0, right=0.88, top=0.9, bottom=0.02, wspace=0.03)
+    figure.subplots_adjust(left=0.0, right=0.86, top=0.9, bottom=0.02, wspace=0.03)
     corners = np.array(box_edges(snapshot, x, r)).reshape(-1, 3)
     frame = np.concatenate([x, corners]), np.concatenate([r, np.zeros(len(corners))])
     titles = ("free grains by pressure" + ", fixed ones grey" * bool((~free).any()),
@@ -58,6 +58,7 @@ def pressure_3d(snapshot, sigma_0, strong=3, upper=6):
     for axes_, which, letter, title in zip(axes, (np.ones(len(x), bool), chosen), "ab", titles):
         image, place = spheres.render(x[which], r[which], colour[which], pixels=1500, frame=frame)
         axes_.imshow(image, interpolation="antialiased", zorder=2)
+        axes_.set(xlim=(0, image.shape[1]), ylim=(image.shape[0], 0))
         axes_.set_axis_off()
         panel(axes_, letter)
         axes_.set_title(title, pad=4)
@@ -65,7 +66,7 @@ def pressure_3d(snapshot, sigma_0, strong=3, upper=6):
     for p, q in box_edges(snapshot, x, r):
         seen = not (np.allclose(p, hidden) or np.allclose(q, hidden))
         axes[1].plot(*np.transpose([place(p), place(q)]), color="0.45", lw=0.6, ls="-" if seen else ":",
-                     zorder=3 if seen else 1)
+                     zorder=3 if seen else 1, clip_on=False)
     lx, ly, top = corners.max(axis=0)
     for at, length, offset in (((lx / 2, 0, 0), lx, (3, -4)), ((0, ly / 2, 0), ly, (-3, -4)), ((lx, 0, top / 2), top, (3, 0))):
         axes[1].annotate(f"{length:.2f} m", place(np.array(at)), offset, textcoords="offset points", fontsize=7,
@@ -154,7 +155,10 @@ def stereonets(consolidated, sheared, tau, sigma, strongest=0.5):
 
 
 def force_distribution(snapshots, labels, sigma_0, factor=4):
-    """Distribution of normal forces, with its exponential tail, and of grain pressures, with the share above factor sigma_0 (par. 31)."""
+    """Distributions of normal forces, with an exponential tail, and of grain pressures, with the share above factor sigma_0.
+
+    One curve for each snapshot, named by its label. Bins with fewer than three values are left out; the dashed tail is that of the
+    last snapshot. Par. 31."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(page, 2.7))
     figure.subplots_adjust(left=0.08, right=0.98, top=0.9, bottom=0.16, wspace=0.28)
     for s, label, look in zip(snapshots, labels, lines(len(snapshots))):
@@ -167,11 +171,15 @@ def force_distribution(snapshots, labels, sigma_0, factor=4):
             centres, density = d.density(values, bins, bins * 0.25)
             shown = density * len(values) * 0.25 > 2.5  # at least three values in a bin
             a.plot(centres[shown], density[shown], **look | {"markersize": 2.5, "linewidth": 0.9}, label=name)
-    tail, least = np.array([1.5, left.get_xlim()[1]]), left.get_ylim()[0]
+    for a in (left, right):
+        a.set(yscale="log", xlim=0, ylabel="probability density")
+        low, high = a.get_ylim()
+        a.set_ylim(low, high * (high / low)**0.45)  # room for the legend
+    tail = np.array([1.5, left.get_xlim()[1]])
     left.plot(tail, np.exp(-beta * (tail - 1.5)) * np.mean(d.force > 1.5) * beta, color="0.4", lw=0.7, ls="--", zorder=0)
-    right.axvline(factor, color="0.4", lw=0.7, ls="--", zorder=0)
-    left.set(yscale="log", xlim=0, ylim=max(least, 1e-12), xlabel="normal force over its mean, $f/\\langle f \\rangle$", ylabel="probability density")
-    right.set(yscale="log", xlim=0, xlabel="grain pressure over $\\sigma_0$", ylabel="probability density")
+    right.axvline(factor, ymax=0.66, color="0.4", lw=0.7, ls="--", zorder=0)
+    left.set_xlabel("normal force over its mean, $f/\\langle f \\rangle$")
+    right.set_xlabel("grain pressure over $\\sigma_0$")
     left.legend(title="tail $\\propto \\exp(-\\beta f/\\langle f \\rangle)$ above 1.5", title_fontsize=7, loc="upper right")
     right.legend(title=f"share above {factor:g} $\\sigma_0$", title_fontsize=7, loc="upper right")
     panel(left, "a")
