@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 
-from . import compaction, forces, paper, profile, rotation, strength
+from . import compaction, forces, profile, rotation, section, strength
 from .case import Case, MissingData
 
 
@@ -84,7 +84,9 @@ def profiles(case, shear, consolidate):
 
 def rotations(case, shear, consolidate):
     spin = rotation.statistics(shear.snapshots[-1])
-    return {f"rotation_{what}_{axis}": value for what, values in (("mean", spin.mean), ("variance", spin.variance))
+    late = shear.snapshots[len(shear.snapshots) * 2 // 3:]
+    return {"opposite_spins": np.mean([section.opposite_spins(x) for x in late])} | {
+        f"rotation_{what}_{axis}": value for what, values in (("mean", spin.mean), ("variance", spin.variance))
             for axis, value in zip("xyz", values)}
 
 

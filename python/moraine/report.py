@@ -145,6 +145,12 @@ def rotation_lines(rows):
                            show(value, half, digits, unit), compare(value, half, reference))
 
 
+    if known(rows, "opposite_spins"):
+        share, half = mean_interval(100 * column(rows, "opposite_spins"))
+        yield Line("contacts whose grains spin against each other", "par. 44, Fig. 10", "grains prefer to roll in opposite directions",
+                   f"{show(share, half, 1, ' %')} (50 % if they did not)", "holds" if share - half > 50 else "does not hold")
+
+
 def rate_lines(rows):
     if known(rows, "collapse_r2"):
         time, r2, creep, creep_r2 = (column(rows, k).mean() for k in ("collapse_time_s", "collapse_r2", "creep_time_s", "creep_r2"))
