@@ -68,7 +68,7 @@ class Progress:
             return False
         index = int(series["stage"][-1])
         if not 0 <= index < len(case.stages):
-            raise MissingData(f"{self.file}: has rows of stage {index}, but {case.output}/case.toml has {len(case.stages)} stages")
+            raise MissingData(f"{self.file}: has rows of stage {index}, but its case.toml has {len(case.stages)} stages")
         before, time_before = self.stage.index if self.case else None, self.series["time"][-1] if self.case else 0
         self.case, self.series, self.stage = case, series, case.stages[index]
         self.own = self.stage.series

@@ -6,6 +6,7 @@ from pathlib import Path
 import shutil
 import signal
 import sys
+import textwrap
 import time
 
 from .case import MissingData
@@ -76,7 +77,8 @@ def status(progress, state):
     if state == "stopped":
         return [where, clock, numbers, [progress.why_stopped], [f"To go on: {again}"]]
     if state == "silent":
-        return [where, clock, numbers, [f"no new row for {readable(progress.silence()[0])}: has the run been stopped? {again}"]]
+        since = readable(progress.silence()[0])
+        return [where, clock, numbers, [f"no new row for {since}: has the run been stopped? {again}"]]
     return [where, clock, numbers]
 
 
@@ -86,7 +88,7 @@ def wrapped(pieces, width):
         if lines and len(lines[-1]) + 3 + len(piece) <= width:
             lines[-1] += "   " + piece
         else:
-            lines += [piece[k:k + width] for k in range(0, len(piece), width)]
+            lines += textwrap.wrap(piece, width)
     return lines
 
 
@@ -103,7 +105,7 @@ def view(progress, state, notes, by_time, width, height, braille):
 
     rows, x_label, x = curves(progress, by_time)
     wanted, left = panels(progress.stage.kind), height - 1 - len(lines)
-    shape = {across: (width // across, left * across // len(wanted)) for across in (1, 2, 4)}
+    shape = {across: (width // across, left * across // len(wanted)) for across in (1, 2, 4) if across == 1 or width // across >= 28}
     across = max(shape, key=lambda a: min(shape[a][1], shape[a][0] / 3))  # the least distorted panels
     wide, high = shape[across][0], min(shape[across][1], shape[across][0] // 2)
     if high < 4:  # too low for all: as many as there is room for
