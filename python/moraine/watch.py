@@ -120,6 +120,8 @@ class Picture:
     """A PNG of the same curves. Written aside and renamed, so that a viewer never sees half of it."""
 
     def __init__(self, file, by_time):
+        from . import style  # takes a moment to load, which --no-png saves
+        self.plt, self.page, self.colour = style.plt, style.page, style.lines(2)[1]["color"]
         self.file, self.by_time, self.problem = Path(file), by_time, ""
         self._took, self._drawn, self._due = 0.0, -math.inf, False
 
@@ -144,12 +146,11 @@ class Picture:
         self._took = self._drawn - began
 
     def _draw(self, progress, file):
-        from . import style  # takes a second to load
         rows, x_label, x = curves(progress, self.by_time)
-        figure, axes = style.plt.subplots(2, 2, figsize=(style.page, 4.6), layout="constrained")
+        figure, axes = self.plt.subplots(2, 2, figsize=(self.page, 4.6), layout="constrained")
         try:
             for ax, (name, column, log) in zip(axes.flat, panels(progress.stage.kind)):
-                ax.plot(x, rows[column], color=style.lines(2)[1]["color"])
+                ax.plot(x, rows[column], color=self.colour)
                 if log and (rows[column] > 0).any():
                     ax.set_yscale("log")
                 ax.set(xlabel=x_label, ylabel=name)
@@ -159,7 +160,7 @@ class Picture:
             figure.align_ylabels()
             figure.savefig(file, format="png", dpi=150)
         finally:
-            style.plt.close(figure)
+            self.plt.close(figure)
 
 
 class Screen:
