@@ -148,12 +148,15 @@ class Case:
         self.output = self.directory / "output"
         try:
             self.text = (self.output / "case.toml").read_text()
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             what = "has no results yet; run it first: ./moraine run" if (self.directory / "case.toml").exists() else \
                 "is no case directory, which would hold a case.toml:"
             raise MissingData(f"{self.directory} {what} {self.directory}") from None
-        self.settings = tomllib.loads(self.text)
-        self.stages = [Stage(self, k, s) for k, s in enumerate(self.settings["stage"])]
+        try:
+            self.settings = tomllib.loads(self.text)
+            self.stages = [Stage(self, k, s) for k, s in enumerate(self.settings["stage"])]
+        except (tomllib.TOMLDecodeError, KeyError) as why:
+            raise MissingData(f"{self.output}/case.toml: not what a run of Moraine writes: {why}") from None
 
     def __repr__(self):
         return f"Case({str(self.directory)!r}: {', '.join(s.name for s in self.stages)})"
@@ -165,7 +168,7 @@ class Case:
     def read_series(self):
         """The whole series as it is now; `series` keeps what it has once read."""
         file = self.output / "series.h5"
-        with _open(file, swmr=True) as h5:
+        with _open(file, swmr=True, locking=False) as h5:  # a lock, however short, could make a run that resumes fail
             table = _table(file, h5)
         length = min((len(c) for c in table.columns.values()), default=0)  # a row may be on its way
         return table.rows(slice(length))

@@ -83,11 +83,14 @@ def profiles(case, shear, consolidate):
 
 
 def rotations(case, shear, consolidate):
-    spin = rotation.statistics(shear.snapshots[-1])
+    """Of all grains, as the paper's seem to be, and of the free ones: those of the two layers do not turn."""
+    last = shear.snapshots[-1]
     late = shear.snapshots[len(shear.snapshots) * 2 // 3:]
-    return {"opposite_spins": np.mean([section.opposite_spins(x) for x in late])} | {
-        f"rotation_{what}_{axis}": value for what, values in (("mean", spin.mean), ("variance", spin.variance))
-            for axis, value in zip("xyz", values)}
+    out = {"opposite_spins": np.mean([section.opposite_spins(x) for x in late])}
+    for name, found in (("rotation", rotation.statistics(last, all_grains=True)), ("free_rotation", rotation.statistics(last))):
+        for axis, mean, variance in zip("xyz", found.mean, found.variance):
+            out |= {f"{name}_mean_{axis}": mean, f"{name}_variance_{axis}": variance}
+    return out
 
 
 def force_chains(case, shear, consolidate):

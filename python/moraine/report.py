@@ -141,8 +141,9 @@ def rotation_lines(rows):
         for axis, reference in zip("xyz", references):
             if known(high, key := f"rotation_{what}_{axis}"):
                 value, half = mean_interval(column(high, key))
-                yield Line(f"{what} of the rotation about {axis} at 80 kPa", "par. 45, Fig. 11", f"{reference:g}{unit}",
-                           show(value, half, digits, unit), compare(value, half, reference))
+                free = column(high, f"free_{key}").mean()
+                yield Line(f"{what} of the rotation about {axis} at 80 kPa, all grains", "par. 45, Fig. 11", f"{reference:g}{unit}",
+                           f"{show(value, half, digits, unit)} (free grains only: {free:.{digits}f})", compare(value, half, reference))
 
 
     if known(rows, "opposite_spins"):

@@ -1,4 +1,5 @@
-import sys
 from pathlib import Path
+import sys
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "python"))
+root = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(root / "python"))

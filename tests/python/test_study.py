@@ -85,7 +85,7 @@ def rows(phi=30.0, C=1e3, noise=0.0, count=3):
     rng = np.random.default_rng(2)
     return [{"seed": s, "sigma_0_kPa": sigma, "friction_peak": (C / sigma / 1e3 + np.tan(np.radians(phi))) + noise * rng.normal(),
              "friction_peak_raw": 0.7 + 0.01 * rng.normal(), "friction_ultimate": 0.35 + 0.003 * rng.normal(), "strain_peak": 0.01 * sigma + 0.01 * rng.normal(),
-             "strain_dilated": 0.3 + 0.01 * rng.normal(), "dilation_d": 0.75 + 1e-3 * s, "rotation_mean_x": -0.003 + 0.01 * rng.normal()}
+             "strain_dilated": 0.3 + 0.01 * rng.normal(), "dilation_d": 0.75 + 1e-3 * s, "rotation_mean_x": (x := -0.003 + 0.01 * rng.normal()), "free_rotation_mean_x": x}
             for s in range(1, count + 1) for sigma in (10.0, 20.0, 40.0, 60.0, 80.0, 120.0)]
 
 
