@@ -4,32 +4,33 @@ _moraine() {
   root=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/..
   for ((i = 1; i < COMP_CWORD; ++i)); do
     case ${COMP_WORDS[i]} in
-      run | sweep | check | keys | bench | import-sphere | watch | figures | reproduce | test)
+      run | sweep | check | keys | bench | import-sphere | watch | figures | report | reproduce | test)
         command=${COMP_WORDS[i]}
         break
         ;;
     esac
   done
   case $command in
-    '') words="run sweep check keys bench import-sphere watch figures reproduce test --help --version --cuda" ;;
+    '') words="run sweep check keys bench import-sphere watch figures report reproduce test --help --version --cuda" ;;
     run) words="--resume --force --quiet --set --backend --threads --help" ;;
     sweep) words="--resume --force --quiet --set --at-once --backend --threads --help" ;;
     check) words="--set --backend --threads --help" ;;
     bench) words="--steps --stage --set --backend --threads --help" ;;
     watch) words="--interval --once --time --png --no-png --help" ;;
     figures) words="--output --format --only --help" ;;
-    reproduce) words="--preset --seeds --quick --cores --set --dry-run --help" ;;
+    report) words="--output --notes --help" ;;
+    reproduce) words="--preset --seeds --quick --set --settled --output --cores --gpu --dry-run --help" ;;
     import-sphere | keys) words="--help" ;;
   esac
   case $previous in
     --backend) words="cpu cuda auto" ;;
     --preset) words="paper standard fast" ;;
-    --set | --at-once | --threads | --steps | --stage | --interval | --format | --only | --seeds | --cores) return ;;
+    --set | --at-once | --threads | --steps | --stage | --interval | --format | --only | --seeds | --cores | --settled) return ;;
   esac
   COMPREPLY=()
   if [[ ! $command || $word == -* || $previous == @(--backend|--preset) ]]; then
     mapfile -t COMPREPLY < <(compgen -W "$words" -S ' ' -- "$word")
-  elif [[ $command == import-sphere || $previous == @(--png|--output) ]]; then
+  elif [[ $command == import-sphere || $previous == @(--png|--output|--notes) ]]; then
     compopt -o filenames +o nospace
     mapfile -t COMPREPLY < <(compgen -f -- "$word")
   elif [[ $command == reproduce ]]; then  # by name
@@ -37,7 +38,7 @@ _moraine() {
       d=${d%/Snakefile} d=${d##*/}
       [[ $d == '*' || $d != "$word"* ]] || COMPREPLY+=("$d ")
     done
-  elif [[ $command == @(run|sweep|check|bench|watch|figures) ]]; then  # directories with a case in them, and those on the way there
+  elif [[ $command == @(run|sweep|check|bench|watch|figures|report) ]]; then  # directories with a case in them, and those on the way there
     while read -r d; do
       if [[ -e $d/case.toml ]]; then
         COMPREPLY+=("$d ")

@@ -11,7 +11,6 @@ from pathlib import Path
 import json
 import os
 import re
-import shlex
 import sys
 
 quick_bed = {"grains.count": "1000", "grains.columns_x": "4", "grains.columns_y": "4"}
@@ -46,6 +45,7 @@ class Study:
     settled: str = ""                               # name of the study whose settled beds are used; empty: see above
     results: str = ""
     moraine: str = "../../moraine"
+    python: str = sys.executable    # one that has what `moraine report` imports; Snakemake's own may not
     gpu: bool = False
 
     @property
@@ -72,10 +72,6 @@ class Study:
     @property
     def backend(self):
         return "--backend cuda" if self.gpu else "--backend cpu"
-
-    @property
-    def python(self):
-        return shlex.quote(sys.executable)
 
     @classmethod
     def from_config(cls, config):

@@ -28,7 +28,7 @@ def test_commands():
     ("run", "--resume --force --quiet --set --backend --threads --help"),
     ("watch", "--interval --once --time --png --no-png --help"),
     ("figures", "--output --format --only --help"),
-    ("reproduce", "--preset --seeds --quick --cores --set --dry-run --help"),
+    ("reproduce", "--preset --seeds --quick --set --settled --output --cores --gpu --dry-run --help"),
 ])
 def test_options(command, options):
     assert complete(command, "-") == options.split()
