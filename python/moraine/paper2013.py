@@ -25,10 +25,11 @@ def stress_names(text):
 
 
 def variant_names(settings):
-    """mass-64kg; with its stage where several keys have the same last word."""
+    """mass-64kg, shear.duration-2s: the last word of the key, with its stage, or its table where two keys have the same last word."""
     last = [key.rpartition(".")[2] for key in settings]
-    return [f"{word if last.count(word) == 1 else key.removeprefix('stage.')}-{re.sub(r'[^A-Za-z0-9.-]+', '', value)}"
-            for word, (key, value) in zip(last, settings.items())]
+    def name(key, word):
+        return key.removeprefix("stage.") if key.startswith("stage.") or last.count(word) > 1 else word
+    return [f"{name(key, word)}-{re.sub(r'[^A-Za-z0-9.-]+', '', value)}" for word, (key, value) in zip(last, settings.items())]
 
 
 def concerns_bed(key):

@@ -27,7 +27,7 @@ def test_a_study_and_its_cases():
 
 def test_a_variant_shares_the_settled_bed():
     study = Study(seeds=[1], settings={"wall.mass": "64 kg", "stage.shear.clear_history": "true"})
-    assert study.name == "fast+mass-64kg+clear_history-true"
+    assert study.name == "fast+mass-64kg+shear.clear_history-true"
     cases = {str(d): tomllib.loads(text) for d, text in study.case_files()}
     assert set(cases) == {"runs/fast/seed-1/settle", f"runs/{study.name}/seed-1/shear"}
     assert cases["runs/fast/seed-1/settle"].keys() == {"extends", "model", "grains"}
@@ -44,9 +44,9 @@ def test_a_variant_of_the_bed_settles_its_own():
     assert "stage" not in cases[f"runs/{study.name}/seed-1/shear"]
 
 
-def test_the_same_word_twice_keeps_its_stage():
-    study = Study(settings={"stage.consolidate.mu_s": "0.1", "stage.shear.mu_s": "0.3"})
-    assert study.name == "fast+consolidate.mu_s-0.1+shear.mu_s-0.3"
+def test_the_same_word_twice_keeps_its_table():
+    study = Study(settings={"contact.gamma_n": "200 N s/m", "wall.gamma_n": "0"})
+    assert study.name == "fast+contact.gamma_n-200Nsm+wall.gamma_n-0"
 
 
 def test_beds_of_another_study():
