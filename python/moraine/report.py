@@ -178,6 +178,7 @@ class Variant:
     runs: int
     strain: float
     values: dict    # name: (main, variant, half width of the 95 % interval of the mean difference or nan)
+    rows: list      # strengths of both, run by run
 
 
 compared = {"friction_peak_raw": "peak friction, raw", "friction_peak": "peak friction, smoothed", "friction_ultimate": "friction, last third",
@@ -198,7 +199,8 @@ def variant(main_cases, name, cases):
     for column in compared:
         ours, theirs = np.array([[m[column], v[column]] for m, v in both]).T
         values[column] = ours.mean(), theirs.mean(), mean_interval(theirs - ours)[1]
-    return Variant(name, len(pairs), end, values)
+    rows = [{"study": who, **numbers} for pair in both for who, numbers in zip(("main", name), pair)]
+    return Variant(name, len(pairs), end, values, rows)
 
 
 def machine():
@@ -267,7 +269,7 @@ figure {{ margin: 2em 0; }} figure img {{ max-width: 100%; }} figcaption {{ font
 
 
 def build(study, output, notes=None, say=print):
-    """study: directory of runs (runs/NAME). Writes measurements.csv, figures/, report.html, report.md to `output`."""
+    """study: directory of runs (runs/NAME). Writes measurements.csv, variants.csv, figures/, report.html, report.md to `output`."""
     study, output = Path(study), Path(output)
     output.mkdir(parents=True, exist_ok=True)
     cases = measure.runs(study)
@@ -311,6 +313,7 @@ def build(study, output, notes=None, say=print):
         except MissingData:
             continue
     if variants := [v for v in variants if v]:
+        measure.table([row for v in variants for row in v.rows], output / "variants.csv")
         text.heading("Tests of causes")
         text.paragraph("Each line is a study with other settings, named after them, against the runs above with the same seeds and normal "
                        "stresses, both read up to the same strain. Values: here, there; ± of the difference where there are several runs.")
