@@ -1,10 +1,13 @@
 """The study of the paper: where its runs lie, what they are, and the words of its report."""
+import shutil
 import tomllib
 
 import numpy as np
 import pytest
 
-from moraine import report
+from conftest import root
+from moraine import report, reproduce
+from moraine.__main__ import main
 from moraine.case import MissingData
 from moraine.paper2013 import Study, stress_names
 from moraine.reproduce import seeds
@@ -72,6 +75,23 @@ def test_the_configuration_survives_being_written(tmp_path):
     study = Study(seeds=[1, 2], quick=True, settings={"wall.mass": "64 kg"})
     file = study.write_config(tmp_path)
     assert Study.from_config(json.loads((tmp_path / file).read_text())).name == study.name == "quick+mass-64kg"
+
+
+@pytest.mark.skipif(not shutil.which("snakemake"), reason="snakemake is not installed")
+def test_what_the_workflow_runs(tmp_path, monkeypatch):
+    """With a launcher that only notes its arguments, in a directory whose name has a space."""
+    home = tmp_path / "a copy"
+    shutil.copytree(root / "cases/paper-2013", home / "cases/paper-2013", ignore=shutil.ignore_patterns("runs", ".snakemake", "results"))
+    launcher, calls = home / "moraine", home / "calls"
+    launcher.write_text(f"""#!/bin/sh\nprintf '%s|' "$@" >>'{calls}'\necho >>'{calls}'\n""")
+    launcher.chmod(0o755)
+    (home / "python").symlink_to(root / "python")
+    monkeypatch.setattr(reproduce, "root", home)
+    monkeypatch.delenv("MORAINE_LAUNCHER", raising=False)
+    assert main(["reproduce", "paper-2013", "--seeds", "1", "--cores", "1"]) != 0  # the report finds no run
+    assert calls.read_text().splitlines() == [
+        "run|runs/fast/seed-1/settle|--resume|--threads|1|--backend|cpu|",
+        "sweep|runs/fast/seed-1/shear|--set|normal_stress=10,20,40,60,80,120 kPa|--resume|--threads|1|--backend|cpu|"]
 
 
 def test_seeds():
