@@ -1,5 +1,6 @@
 """./moraine reproduce NAME: runs the study of cases/NAME/Snakefile, what is missing of it, and ends with figures and a report."""
 from pathlib import Path
+import fcntl
 import os
 import re
 import shutil
@@ -58,6 +59,20 @@ def study_of(args):
                            moraine=os.environ.get("MORAINE_LAUNCHER", str(root / "moraine")))
 
 
+def hold(home, study):
+    """Open files that keep other commands off this study and its settled beds; the system lets go of them however this one ends."""
+    held = []
+    for name in sorted({study.name, study.bed}):
+        directory = home / "runs" / name
+        directory.mkdir(parents=True, exist_ok=True)
+        held.append((directory / ".lock").open("w"))
+        try:
+            fcntl.flock(held[-1], fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise MissingData(f"{directory} is in use by another reproduce; wait for its end") from None
+    return held
+
+
 def run(args):
     home = root / "cases" / args.NAME
     if not (home / "Snakefile").exists():
@@ -66,13 +81,15 @@ def run(args):
     if not snakemake:
         raise MissingData("snakemake is not installed (Debian: apt-get install snakemake)")
     study = study_of(args)
+    held = [] if args.dry_run else hold(home, study)
     command = [snakemake, "--snakefile", "Snakefile", "--cores", str(args.cores), "--configfile", str(study.write_config(home)),
                # What has been computed stays valid when only words of the workflow change.
-               "--rerun-triggers", "mtime", "--keep-going", "--rerun-incomplete"]
+               "--rerun-triggers", "mtime", "--keep-going", "--rerun-incomplete",
+               "--nolock"]  # Snakemake's own lock outlives a power cut, and then wants to be removed by hand
     if args.dry_run:
         command.append("--dry-run")
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [str(root / "python"), os.environ.get("PYTHONPATH")]))}
-    status = subprocess.run(command, cwd=home, env=environment).returncode
+    status = subprocess.run(command, cwd=home, env=environment, pass_fds=[f.fileno() for f in held]).returncode
     if status == 0 and not args.dry_run:
         print(f"report: {home / 'runs' / study.name / 'results' if not args.output else Path(args.output)}/report.html")
     return status

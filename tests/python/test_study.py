@@ -1,4 +1,5 @@
 """The study of the paper: where its runs lie, what they are, and the words of its report."""
+import contextlib
 import shutil
 import tomllib
 
@@ -92,6 +93,16 @@ def test_what_the_workflow_runs(tmp_path, monkeypatch):
     assert calls.read_text().splitlines() == [
         "run|runs/fast/seed-1/settle|--resume|--threads|1|--backend|cpu|",
         "sweep|runs/fast/seed-1/shear|--set|normal_stress=10,20,40,60,80,120 kPa|--resume|--threads|1|--backend|cpu|"]
+
+
+def test_two_at_once_do_not_share_a_bed(tmp_path):
+    with contextlib.ExitStack() as stack:
+        for file in reproduce.hold(tmp_path, Study(seeds=[1])):
+            stack.enter_context(file)
+        with pytest.raises(MissingData, match="runs/fast is in use by another reproduce"):
+            reproduce.hold(tmp_path, Study(seeds=[1], settings={"wall.mass": "64 kg"}))
+        reproduce.hold(tmp_path, Study(preset="paper"))
+    reproduce.hold(tmp_path, Study(seeds=[1], settings={"wall.mass": "64 kg"}))
 
 
 def test_seeds():
