@@ -128,7 +128,7 @@ def rotations(snapshot):
     omega = rotation.rotations(snapshot)
     found = rotation.statistics(snapshot)
     figure, all_axes = plt.subplots(1, 3, figsize=(page, 2.5), gridspec_kw={"wspace": 0.34})
-    reach = np.percentile(np.abs(omega), 99.8)
+    reach = np.percentile(np.abs(omega), 99.8) or 1.0  # nothing has turned yet
     for axes, (a, b), letter in zip(all_axes, ((0, 1), (0, 2), (1, 2)), "abc"):
         axes.plot(omega[:, a], omega[:, b], ".", color=ink, alpha=0.25, ms=2, mew=0, rasterized=True)
         axes.axhline(0, color="0.6", lw=0.5), axes.axvline(0, color="0.6", lw=0.5)

@@ -15,7 +15,7 @@ class Selection:
         self.cases = [c for c in cases if any(s.sheared for s in c.stages)]
         if not self.cases:
             raise MissingData(f"{cases[0].directory}: no case with a shear stage" if cases else "no case was given")
-        self.cases.sort(key=lambda c: (c.normal_stress, c.settings["grains"]["seed"]))
+        self.cases.sort(key=lambda c: (c.normal_stress, c.seed))
         self.one = min(self.cases, key=lambda c: abs(c.normal_stress - 80e3))  # the paper's choice for its Figs. 5 to 7, 10, 11, 13
 
     @property

@@ -13,7 +13,7 @@ def runs(directory):
     found = [Case(p.parents[1]) for p in Path(directory).glob("seed-*/shear/sweep/*/output/case.toml")]
     if not found:
         raise MissingData(f"{directory}: there is no run; expected seed-*/shear/sweep/*/output")
-    return sorted(found, key=lambda c: (c.settings["grains"]["seed"], c.normal_stress))
+    return sorted(found, key=lambda c: (c.seed, c.normal_stress))
 
 
 def hours(case):
@@ -32,7 +32,7 @@ def strengths(case, until=None):
         rows = rows.rows(rows["shear_strain"] <= until)
     late = rows["shear_strain"] >= strength.late * s.strain
     return {
-        "seed": case.settings["grains"]["seed"], "sigma_0_kPa": shear.settings["normal_stress"] / 1e3, "strain": s.strain,
+        "seed": case.seed, "sigma_0_kPa": shear.settings["normal_stress"] / 1e3, "strain": s.strain,
         "friction_peak_raw": s.peak_raw, "strain_peak_raw": s.peak_raw_strain, "tau_peak_raw_kPa": s.tau_peak_raw / 1e3,
         "friction_peak": s.peak, "strain_peak": s.peak_strain,
         "friction_ultimate": s.ultimate, "friction_ultimate_std": s.ultimate_std,

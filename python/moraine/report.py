@@ -187,7 +187,7 @@ compared = {"friction_peak_raw": "peak friction, raw", "friction_peak": "peak fr
 def variant(main_cases, name, cases):
     """Or nothing, where no seed and normal stress are common to both."""
     def key(case):
-        return case.settings["grains"]["seed"], case.normal_stress
+        return case.seed, case.normal_stress
     main = {key(c): c for c in main_cases}
     pairs = [(main[key(c)], c) for c in cases if key(c) in main]
     if not pairs:
