@@ -136,6 +136,15 @@ def test_verdicts_follow_the_numbers():
     assert find(lines, "mean of the rotation about x").verdict == "agrees"
 
 
+def test_a_trend_is_no_stronger_than_its_runs():
+    assert report.trend([1, 2, 3], [1, 2, 3], [1, 1, 1])[:2] == pytest.approx((1, 1 / 3), abs=0.02)  # of 6 orders, 2
+    assert report.trend(range(6), range(6), [1] * 6)[:2] == pytest.approx((1, 2 / 720), abs=2e-3)
+    rank, p, _ = report.trend([1, 2, 3] * 2, [1, 2, 3, 11, 12, 13], [1, 1, 1, 2, 2, 2])  # packings that differ hide no trend
+    assert rank < 0.6 and p == pytest.approx(2 / 36, abs=0.01)
+    three = [r for r in rows(count=1) if r["sigma_0_kPa"] in (20, 80, 120)]
+    assert find(report.quantities(three), "strain at the smoothed peak").verdict == "too few runs to tell"
+
+
 def test_one_run_gives_no_interval():
     lines = report.quantities(rows(count=1))
     assert find(lines, "dilation at 80 kPa").verdict == "no interval"
