@@ -169,7 +169,7 @@ def laboratory(cases):
     under.set_ylabel("dilation (mean grain diameters)")
     under.set_xlabel("shear strain $\\gamma$")
     under.set_xlim(0, end * 1.25)
-    under.set_title("total (par. 52); the till contracts", loc="right", fontsize=7, color="0.35")
+    under.set_title("total at 80 kPa (par. 52); the till contracts", loc="right", fontsize=7, color="0.35")
     handles, labels = over.get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower center", bbox_to_anchor=(0.5, -0.09), ncol=3)
     figure.align_ylabels()

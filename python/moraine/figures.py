@@ -63,7 +63,7 @@ all_figures = (
            "single grains at the lowest stress.", lambda s: bed_figures.displacement(s.cases)),
     Figure("fig09-porosity", "Porosity of horizontal slabs at the end, each sphere cut exactly (Fig. 9). The slabs at floor and "
            "top wall are left out.", lambda s: bed_figures.porosity(s.cases)),
-    Figure("fig10-section", "Vertical section through the upper part of the bed at three times close to each other (Fig. 10): contact pressure, "
+    Figure("fig10-section", "Vertical section through the upper part of the bed at the last snapshots of the shear (Fig. 10; times above the panels): contact pressure, "
            "rotation (black arrows), velocity (white), slip at contacts (green). Grains that spin along with the shear have a black rim.",
            lambda s: force_figures.section(s.shear.snapshots[-3:], s.one.normal_stress)),
     Figure("fig11-rotation", "Rotation of each free grain since shear began, about each axis (Fig. 11). Plus: mean.",
