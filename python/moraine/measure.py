@@ -43,8 +43,9 @@ def strengths(case, until=None):
 
 
 def tilt(tensor):
-    """Angle from the vertical of the axis of its largest principal value, degrees."""
-    return 90 - forces.maximum_compressive_direction(tensor)[1]
+    """Angle from the vertical of the axis of its largest principal value, degrees; positive where it dips towards +x."""
+    trend, plunge = forces.maximum_compressive_direction(tensor)
+    return np.copysign(90 - plunge, np.cos(np.radians(trend)))
 
 
 def strong_tilt(snapshot):
@@ -101,7 +102,7 @@ def force_chains(case, shear, consolidate):
     friction = rows["shear_friction"][rows["shear_strain"] >= strength.late * rows["shear_strain"][-1]].mean()
     return {"above_4_consolidated": forces.share_above(before, sigma_0),
             "above_4_sheared": np.mean([forces.share_above(x, sigma_0) for x in late]),
-            "strong_tilt_consolidated": strong_tilt(before), "strong_tilt_sheared": np.mean([strong_tilt(x) for x in late]),
+            "strong_tilt_consolidated": abs(strong_tilt(before)), "strong_tilt_sheared": np.mean([strong_tilt(x) for x in late]),
             "stress_tilt": np.mean([tilt(forces.stress_tensor(x)) for x in late]),
             "applied_tilt": np.degrees(np.arctan(friction))}
 

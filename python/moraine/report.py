@@ -146,7 +146,7 @@ def force_lines(rows):
     tilt, half = mean_interval(column(rows, "strong_tilt_consolidated"))
     yield Line("strongest half of the contacts, consolidated: main direction", "par. 31, Fig. 7", "vertical",
                f"{show(tilt, half, 1, '°')} from the vertical", "holds" if tilt < 15 else "does not hold")
-    tilt, half = mean_interval(column(rows, "strong_tilt_sheared"))
+    tilt, half = mean_interval(column(rows, "strong_tilt_sheared"))  # positive: dipping towards +x
     applied, stress = column(rows, "applied_tilt").mean(), column(rows, "stress_tilt").mean()
     yield Line("the same in shear, towards the shear direction", "par. 31, Fig. 7", "along the maximum compressive stress σ' + τ",
                f"{show(tilt, half, 1, '°')} from the vertical; largest principal stress, from the contacts: {stress:.1f}°; σ' and τ "
@@ -168,20 +168,21 @@ def rotation_lines(rows):
     if known(rows, "opposite_spins"):
         share, half = mean_interval(100 * column(rows, "opposite_spins"))
         yield Line("contacts whose grains spin against each other", "par. 44, Fig. 10", "grains prefer to roll in opposite directions",
-                   f"{show(share, half, 1, ' %')} (50 % if they did not)", "holds" if share - half > 50 else "does not hold")
+                   f"{show(share, half, 1, ' %')} (50 % if they did not)", "no interval" if np.isnan(half) else "holds" if share - half > 50 else "does not hold")
 
 
 def rate_lines(rows):
     if known(rows, "collapse_r2"):
-        time, r2, creep, creep_r2 = (column(rows, k).mean() for k in ("collapse_time_s", "collapse_r2", "creep_time_s", "creep_r2"))
+        time, creep = column(rows, "collapse_time_s").mean(), column(rows, "creep_time_s").mean()
+        r2, creep_r2 = column(rows, "collapse_r2").min(), column(rows, "creep_r2").min()
         yield Line("consolidation", "par. 29", "volumetric strain rate decays exponentially",
-                   f"collapse of the loose top with a time of {1e3 * time:.0f} ms (R² {r2:.3f}), then creep with {creep:.2f} s (R² {creep_r2:.3f})",
+                   f"collapse of the loose top with a time of {1e3 * time:.0f} ms (R² ≥ {r2:.3f}), then creep with {creep:.2f} s (R² ≥ {creep_r2:.3f})",
                    "holds, in two steps" if min(r2, creep_r2) > 0.9 else "does not hold")
     if known(rows, "inertia_number"):
         numbers = dict(zip(column(rows, "sigma_0_kPa"), column(rows, "inertia_number")))
         ends = " to ".join(f"{numbers[s]:.2g} ({s:g} kPa)" for s in sorted({min(numbers), max(numbers)}))
         yield Line("inertia number I (eq. 1)", "par. 28", "7.5e-4 (10 kPa) to 2.2e-4 (120 kPa)", ends,
-                   "cannot agree: eq. 1 with the values of Table 1 gives 5.1e-4 and 1.5e-4")
+                   "the paper's own Table 1 gives 5.1e-4 and 1.5e-4 by eq. 1")
 
 
 def quantities(rows):
@@ -288,6 +289,8 @@ figure {{ margin: 2em 0; }} figure img {{ max-width: 100%; }} figcaption {{ font
 def build(study, output, notes=None, say=print):
     """study: directory of runs (runs/NAME). Writes measurements.csv, figures/, report.html, report.md to `output`."""
     study, output = Path(study), Path(output)
+    if notes and not Path(notes).is_file():
+        raise MissingData(f"there is no file {notes}")
     output.mkdir(parents=True, exist_ok=True)
     cases = measure.runs(study)
     say(f"measuring {len(cases)} runs")
@@ -336,7 +339,7 @@ def build(study, output, notes=None, say=print):
         text.table(["settings", "runs", "up to strain", *compared.values()],
                    [[v.name, v.runs, f"{v.strain:.2f}"] + [f"{a:.3f}, {b:.3f}" + (f" (±{h:.3f})" if np.isfinite(h) else "")
                                                            for a, b, h in v.values.values()] for v in variants])
-    if notes and Path(notes).exists():
+    if notes:
         add_notes(text, Path(notes).read_text())
 
     text.heading("Figures")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from conftest import root
-from moraine import report, reproduce
+from moraine import measure, report, reproduce
 from moraine.__main__ import main
 from moraine.case import MissingData
 from moraine.paper2013 import Study, stress_names
@@ -150,6 +150,20 @@ def test_one_run_gives_no_interval():
     assert find(lines, "dilation at 80 kPa").verdict == "no interval"
 
 
+def test_directions_have_a_sign():
+    along, against = (measure.tilt(np.outer(v, v)) for v in ([1.0, 0, -1], [-1.0, 0, -1]))
+    assert along == pytest.approx(45) and against == pytest.approx(-45)
+    chains = {"above_4_sheared": 0.1, "above_4_consolidated": 0.1, "strong_tilt_consolidated": 3.0, "applied_tilt": 20.0, "stress_tilt": 40.0}
+    for tilt, verdict in ((40, "along the principal stress"), (20, "holds"), (-20, "does not hold")):
+        lines = report.quantities([r | chains | {"strong_tilt_sheared": tilt} for r in rows()])
+        assert find(lines, "the same in shear").verdict == verdict
+
+
+def test_one_run_cannot_tell_how_grains_roll():
+    lines = report.quantities([r | {"opposite_spins": 0.6} for r in rows(count=1)[:1]])
+    assert find(lines, "contacts whose grains spin").verdict == "no interval"
+
+
 def test_what_was_not_measured_is_left_out():
     lines = report.quantities(rows())
     assert not [x for x in lines if "4 σ_0" in x.quantity or "shear zone at" in x.quantity]
@@ -163,7 +177,6 @@ def test_mean_and_interval():
 
 
 def test_table_survives_being_written(tmp_path):
-    from moraine import measure
     file = tmp_path / "m.csv"
     measure.table(rows(), file)
     again = measure.read_table(file)
