@@ -6,6 +6,7 @@ import numpy as np
 
 from . import compaction, forces, profile, rotation, section, strength
 from .case import Case, MissingData
+from .progress import duration
 
 
 def runs(directory):
@@ -107,8 +108,18 @@ def force_chains(case, shear, consolidate):
             "applied_tilt": np.degrees(np.arctan(friction))}
 
 
+def require_end(case):
+    """Raises MissingData where the shear has not come to its end: its ultimate state would be that of the strain it has."""
+    shear = case.stage("shear")
+    rows = shear.series
+    share = rows["stage_time"][-1] / duration(shear, rows["height"][0])
+    if share < 0.999:
+        raise MissingData(f"{case.directory}: the shear has come to {100 * share:.0f} % of its time; it is still running, or was cut off")
+
+
 def measure(case, say=print):
     """The strengths, and all that can be had from consolidation and snapshots; what lacks data is left out, and said."""
+    require_end(case)
     out = strengths(case)
     for part in (about, consolidation, profiles, rotations, force_chains):
         try:

@@ -3,6 +3,8 @@
 # Normal stresses of the experiments, Pa. The text gives their range (Table 1); the four between are those of Figs. 4, 8 and 9.
 normal_stresses = (10e3, 20e3, 40e3, 60e3, 80e3, 120e3)
 
+grains = 10_000
+
 sampling = 0.05         # s between two rows of the paper's series
 shear_strain_rate = 0.05  # 1/s
 total_shear_strain = 1.0  # 0.738 m over the height of the bed (caption of Fig. 8)

@@ -239,6 +239,17 @@ def version():
     return git.stdout.strip() if git.returncode == 0 else "unknown"
 
 
+def differs(rows):
+    """What sets these runs apart from the paper's, whatever their settings; empty if nothing."""
+    grains, strain = column(rows, "grains").min(), column(rows, "strain").min()
+    small = f"{grains:,.0f} grains instead of {paper.grains:,}" if grains < paper.grains else ""
+    short = f"a shear strain of {strain:.2f} instead of {paper.total_shear_strain:g}" if strain < 0.99 * paper.total_shear_strain else ""
+    if not small + short:
+        return ""
+    return f"These runs have {' and '.join(filter(None, (small, short)))}, so a difference from the paper may come from that alone" + \
+        (": ultimate strength, dilation, shear zone and rotation are those of this strain." if short else ".")
+
+
 class Report:
     """Collects text once and writes it as HTML and as Markdown."""
 
@@ -300,10 +311,11 @@ def build(study, output, notes=None, say=print):
         left_out.append(why)
         say(why)
 
-    rows = []
+    rows, measured = [], []
     for case in cases:
         try:
             rows.append(measure.measure(case, note))
+            measured.append(case)
         except MissingData as why:
             note(f"left out: {why}")
     if not rows:
@@ -316,8 +328,10 @@ def build(study, output, notes=None, say=print):
     first = rows[0]
     text.paragraph(f"{len(rows)} runs of {first.get('grains', '?')} grains: normal stress {', '.join(f'{s:g}' for s in stresses)} kPa, "
                    f"seeds {', '.join(map(str, seeds))}, preset {first.get('preset')} (f = {first.get('f', np.nan):g}, k_n = {first.get('k_n', np.nan):.3g} N/m), sheared "
-                   f"to a strain of {min(r['strain'] for r in rows):.2f}. {first.get('program', 'moraine').split(',')[0]}, version {version()}, on {machine()}; "
-                   f"{np.nansum(column(rows, 'hours')):.1f} hours of runs, several at once. {date.today()}.")
+                   f"to a strain of {min(r['strain'] for r in rows):.2f}. {first.get('program', 'moraine').split(',')[0]}, {np.nansum(column(rows, 'hours')):.1f} hours of "
+                   f"runs, several at once. This report: version {version()}, on {machine()}, {date.today()}.")
+    if unlike := differs(rows):
+        text.paragraph(unlike)
     text.paragraph("± is half of a 95 % interval: of φ and C from the Levenberg-Marquardt fit over all runs, of all else from the scatter "
                    "over the seeds. The paper's ± is its standard error. Single runs are in measurements.csv.")
     text.heading("The paper's numbers and these")
@@ -329,7 +343,7 @@ def build(study, output, notes=None, say=print):
     variants = []
     for other in sorted(p for p in study.parent.iterdir() if p.is_dir() and p != study):
         try:
-            variants.append(variant(cases, other.name, measure.runs(other)))
+            variants.append(variant(measured, other.name, measure.runs(other)))
         except MissingData:
             continue
     if variants := [v for v in variants if v]:
@@ -343,7 +357,9 @@ def build(study, output, notes=None, say=print):
         add_notes(text, Path(notes).read_text())
 
     text.heading("Figures")
-    missing = figures.draw(figures.Selection(cases), output / "figures", ("svg", "png", "pdf"), say=say)
+    selection = figures.Selection(measured)
+    text.paragraph(f"Where a figure shows one run, it is that of {selection.one.normal_stress / 1e3:g} kPa and seed {selection.one.seed}.")
+    missing = figures.draw(selection, output / "figures", ("svg", "png", "pdf"), say=say)
     for figure in figures.all_figures:
         if figure.name in missing:
             text.paragraph(f"{figure.name} is not drawn: {missing[figure.name]}")

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from conftest import root
+from fake_case import FakeCase
 from moraine import measure, report, reproduce
 from moraine.__main__ import main
-from moraine.case import MissingData
+from moraine.case import Case, MissingData
 from moraine.paper2013 import Study, stress_names
 from moraine.reproduce import seeds
 
@@ -162,6 +163,25 @@ def test_directions_have_a_sign():
 def test_one_run_cannot_tell_how_grains_roll():
     lines = report.quantities([r | {"opposite_spins": 0.6} for r in rows(count=1)[:1]])
     assert find(lines, "contacts whose grains spin").verdict == "no interval"
+
+
+def test_what_sets_the_runs_apart_is_said():
+    def said(**what):
+        return report.differs([r | {"grains": 10000, "strain": 1.0} | what for r in rows()])
+    assert said() == ""
+    assert "1,000 grains instead of 10,000, so" in said(grains=1000)
+    assert "grains" not in said(strain=0.1) and "a shear strain of 0.10 instead of 1" in said(strain=0.1)
+    assert "10,000 and a shear strain" in said(grains=1000, strain=0.1)
+
+
+def test_a_run_under_way_is_left_out(tmp_path):
+    case = FakeCase(tmp_path / "case")
+    history = case.history()
+    case.write(history)
+    measure.require_end(Case(case.directory))
+    case.write(history[:-30])
+    with pytest.raises(MissingData, match="the shear has come to 8. % of its time"):
+        measure.require_end(Case(case.directory))
 
 
 def test_what_was_not_measured_is_left_out():
