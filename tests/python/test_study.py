@@ -196,6 +196,14 @@ def test_mean_and_interval():
     assert np.isnan(report.mean_interval([1.0])[1])
 
 
+def test_the_paper_s_one_run_may_lie_where_a_further_run_would():
+    rng, inside = np.random.default_rng(3), 0
+    for _ in range(2000):
+        values, other = rng.normal(size=4), rng.normal()
+        inside += report.compare(values.mean(), other, report.further_run(values)) == "agrees"
+    assert inside / 2000 == pytest.approx(0.95, abs=0.015)
+
+
 def test_table_survives_being_written(tmp_path):
     file = tmp_path / "m.csv"
     measure.table(rows(), file)
