@@ -122,7 +122,19 @@ def run(args):
     formats = args.format.split(",")
     if bad := set(formats) - {"pdf", "svg", "png"}:
         raise MissingData(f"--format {','.join(sorted(bad))}: expected pdf, svg or png")
-    selection = Selection(find(args.CASE))
+    cases, early = find(args.CASE), {}
+    for case in cases:
+        try:
+            for stage in case.stages:
+                if stage.sheared:
+                    stage.series
+        except MissingData as why:
+            early[case] = why
+    if len(early) < len(cases):  # else each figure names what it lacks
+        for case, why in early.items():
+            print(f"left out: {why}")
+        cases = [c for c in cases if c not in early]
+    selection = Selection(cases)
     missing = draw(selection, args.output or Path(args.CASE[0]) / "figures", formats, [n for n in args.only.split(",") if n])
     if missing:
         print(f"{len(missing)} not drawn; see above", file=sys.stderr)

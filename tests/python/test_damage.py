@@ -6,6 +6,7 @@ import pytest
 from fake_case import FakeCase
 from fake_snapshot import write
 from moraine import Case, MissingData
+from moraine.__main__ import main
 
 
 def replace(file, **datasets):
@@ -49,3 +50,16 @@ def test_a_damaged_case_is_named(tmp_path, text):
     (case.output / "case.toml").write_bytes(text)
     with pytest.raises(MissingData, match="case.toml: not what a run of Moraine writes"):
         Case(case.directory)
+
+
+def test_figures_leave_out_a_case_that_is_not_sheared_yet(tmp_path, capsys):
+    for name, rows in (("a", None), ("b", 20)):
+        case = FakeCase(tmp_path / name)
+        case.write(case.history()[:rows])
+    words = ["figures", str(tmp_path), "--only", "fig04-friction-dilation", "--format", "svg"]
+    assert main(words) == 0
+    out = capsys.readouterr().out
+    assert "left out" in out and "b/output/series.h5: no rows of stage shear" in out
+    assert (tmp_path / "figures/fig04-friction-dilation.svg").exists()
+    assert main([*words[:1], str(tmp_path / "b"), *words[2:]]) == 1
+    assert "fig04-friction-dilation: not drawn: " in capsys.readouterr().out
