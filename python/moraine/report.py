@@ -320,6 +320,9 @@ def build(study, output, notes=None, say=print):
 
     rows, measured = [], []
     for case in cases:
+        if any((case.seed, case.normal_stress) == (c.seed, c.normal_stress) for c in measured):
+            note(f"left out: {case.directory}: has the seed and the normal stress of another run")
+            continue
         try:
             rows.append(measure.measure(case, note))
             measured.append(case)
