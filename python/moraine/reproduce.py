@@ -50,6 +50,8 @@ def study_of(args):
             stresses = value if "," in value else value + ","
         elif key in ("seed", "grains.seed", "preset", "model.preset"):
             raise MissingData(f"--set {text}: give --{key.rpartition('.')[2].replace('seed', 'seeds')} instead")
+        elif key.endswith(".normal_stress"):
+            raise MissingData(f"--set {text}: give --set normal_stress={value}, which holds for all stages")
         elif "." not in key:
             raise MissingData(f"--set {text}: expected the full name of the key, such as wall.mass; ./moraine keys lists them")
         else:

@@ -11,7 +11,7 @@ from fake_case import FakeCase
 from moraine import measure, report, reproduce
 from moraine.__main__ import main
 from moraine.case import Case, MissingData
-from moraine.paper2013 import Study, stress_names
+from moraine.paper2013 import Study, stress_names, toml
 from moraine.reproduce import seeds
 
 
@@ -52,6 +52,18 @@ def test_a_variant_of_the_bed_settles_its_own():
 def test_the_same_word_twice_keeps_its_table():
     study = Study(settings={"contact.gamma_n": "200 N s/m", "wall.gamma_n": "0"})
     assert study.name == "fast+contact.gamma_n-200Nsm+wall.gamma_n-0"
+
+
+def test_values_are_toml():
+    assert [toml(v) for v in ("0.5", ".5", "1.", "-3", "05", "1e-3", "64 kg", "true")] == \
+        ["0.5", "0.5", "1.0", "-3", "5.0", "1e-3", '"64 kg"', "true"]
+    for text in map(toml, (".5", "1.", "-0", "1e5", "+3", "inf", "64 kg", 'a "b"')):
+        tomllib.loads(f"x = {text}")
+
+
+def test_normal_stresses_are_those_of_the_sweep(capsys):
+    assert main(["reproduce", "paper-2013", "--set", "stage.shear.normal_stress=40kPa", "--dry-run"]) == 1
+    assert "give --set normal_stress=40kPa" in capsys.readouterr().err
 
 
 def test_beds_of_another_study():
