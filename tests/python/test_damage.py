@@ -52,6 +52,14 @@ def test_a_damaged_case_is_named(tmp_path, text):
         Case(case.directory)
 
 
+def test_where_nothing_can_be_written_is_told(tmp_path, capsys):
+    case = FakeCase(tmp_path / "case")
+    case.write(case.history())
+    (tmp_path / "file").touch()
+    assert main(["figures", str(case.directory), "--only", "fig04-friction-dilation", "--output", str(tmp_path / "file/figures")]) == 1
+    assert "moraine: [Errno 20] Not a directory" in capsys.readouterr().err
+
+
 def test_figures_leave_out_a_case_that_is_not_sheared_yet(tmp_path, capsys):
     for name, rows in (("a", None), ("b", 20)):
         case = FakeCase(tmp_path / name)
