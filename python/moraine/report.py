@@ -77,7 +77,7 @@ def trend(x, y, groups, draws=9999):
     their normal stress; and the usual formula gives p = 0 for three values in order, of which every third triple is."""
     x, y, groups = stats.rankdata(x), stats.rankdata(y), np.asarray(groups)
     if np.ptp(y) == 0:
-        return 0.0, 1.0, 1.0
+        return 0.0, 1.0, 0.0
     a, b = x - x.mean(), y - y.mean()
     scale, random = np.sqrt((a**2).sum() * (b**2).sum()), np.random.default_rng(1)
     chance, orders = np.zeros(draws), 1.0
