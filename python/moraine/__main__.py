@@ -24,7 +24,7 @@ def main(words=None):
     args = parser.parse_args(words)
     try:
         return importlib.import_module(f".{commands[args.command][0]}", __package__).run(args) or 0
-    except MissingData as why:
+    except (MissingData, OSError) as why:  # the latter of what cannot be written
         print(f"moraine: {why}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

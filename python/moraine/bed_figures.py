@@ -128,7 +128,7 @@ def rotations(snapshot):
     omega = rotation.rotations(snapshot)
     found = rotation.statistics(snapshot)
     figure, all_axes = plt.subplots(1, 3, figsize=(page, 2.5), gridspec_kw={"wspace": 0.34})
-    reach = np.percentile(np.abs(omega), 99.8)
+    reach = np.percentile(np.abs(omega), 99.8) or 1.0  # nothing has turned yet
     for axes, (a, b), letter in zip(all_axes, ((0, 1), (0, 2), (1, 2)), "abc"):
         axes.plot(omega[:, a], omega[:, b], ".", color=ink, alpha=0.25, ms=2, mew=0, rasterized=True)
         axes.axhline(0, color="0.6", lw=0.5), axes.axvline(0, color="0.6", lw=0.5)
@@ -169,7 +169,7 @@ def laboratory(cases):
     under.set_ylabel("dilation (mean grain diameters)")
     under.set_xlabel("shear strain $\\gamma$")
     under.set_xlim(0, end * 1.25)
-    under.set_title("total (par. 52); the till contracts", loc="right", fontsize=7, color="0.35")
+    under.set_title("total at 80 kPa (par. 52); the till contracts", loc="right", fontsize=7, color="0.35")
     handles, labels = over.get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower center", bbox_to_anchor=(0.5, -0.09), ncol=3)
     figure.align_ylabels()

@@ -57,11 +57,18 @@ def _open(file, **how):
         raise MissingData(f"{file}: cannot be read as HDF5: {why}") from None
 
 
-def _table(file, group):
-    datasets = {name: d for name, d in group.items() if isinstance(d, h5py.Dataset)}
-    units = {name: d.attrs.get("units", b"") for name, d in datasets.items()}
-    units = {name: u.decode() if isinstance(u, bytes) else str(u) for name, u in units.items()}
-    return Table(file, {name: d[()] for name, d in datasets.items()}, units)
+def _table(file, h5, name="/"):
+    """Of the group `name` of an open file."""
+    try:
+        group = h5.get(name)
+        if not isinstance(group, h5py.Group):
+            raise MissingData(f"{h5.filename}: there is no group {name}")
+        datasets = {name: d for name, d in group.items() if isinstance(d, h5py.Dataset)}
+        units = {name: d.attrs.get("units", b"") for name, d in datasets.items()}
+        units = {name: u.decode() if isinstance(u, bytes) else str(u) for name, u in units.items()}
+        return Table(file, {name: d[()] for name, d in datasets.items()}, units)
+    except (OSError, RuntimeError, KeyError) as why:  # as HDF5 finds it damaged
+        raise MissingData(f"{file}: cannot be read: {why}") from None
 
 
 class Snapshot:
@@ -84,9 +91,10 @@ class Snapshot:
 
     def _group(self, name):
         with _open(self.file) as h5:
-            if name not in h5:
-                raise MissingData(f"{self.file}: there is no group {name}")
-            return _table(f"{self.file}:/{name}", h5[name])
+            table = _table(f"{self.file}:/{name}", h5, name)
+        if len({len(column) for column in table.columns.values()}) > 1:
+            raise MissingData(f"{table.file}: the datasets differ in length")
+        return table
 
     @cached_property
     def grains(self):
@@ -94,7 +102,10 @@ class Snapshot:
 
     @cached_property
     def contacts(self):
-        return self._group("contacts")
+        table = self._group("contacts")
+        if any(len(table) and not 0 <= table[k].min() <= table[k].max() < len(self.grains) for k in "ij"):
+            raise MissingData(f"{table.file}: has contacts of grains that are not in the snapshot")
+        return table
 
     @property
     def area(self):
@@ -147,7 +158,7 @@ class Case:
         self.directory = Path(directory)
         self.output = self.directory / "output"
         try:
-            self.text = (self.output / "case.toml").read_text()
+            self.text = (self.output / "case.toml").read_text(errors="replace")
         except (FileNotFoundError, NotADirectoryError):
             what = "has no results yet; run it first: ./moraine run" if (self.directory / "case.toml").exists() else \
                 "is no case directory, which would hold a case.toml:"
@@ -155,7 +166,8 @@ class Case:
         try:
             self.settings = tomllib.loads(self.text)
             self.stages = [Stage(self, k, s) for k, s in enumerate(self.settings["stage"])]
-        except (tomllib.TOMLDecodeError, KeyError) as why:
+            self.seed = self.settings["grains"]["seed"]
+        except (ValueError, KeyError, TypeError) as why:  # of tomllib, too
             raise MissingData(f"{self.output}/case.toml: not what a run of Moraine writes: {why}") from None
 
     def __repr__(self):

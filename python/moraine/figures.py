@@ -15,7 +15,7 @@ class Selection:
         self.cases = [c for c in cases if any(s.sheared for s in c.stages)]
         if not self.cases:
             raise MissingData(f"{cases[0].directory}: no case with a shear stage" if cases else "no case was given")
-        self.cases.sort(key=lambda c: (c.normal_stress, c.settings["grains"]["seed"]))
+        self.cases.sort(key=lambda c: (c.normal_stress, c.seed))
         self.one = min(self.cases, key=lambda c: abs(c.normal_stress - 80e3))  # the paper's choice for its Figs. 5 to 7, 10, 11, 13
 
     @property
@@ -63,7 +63,7 @@ all_figures = (
            "single grains at the lowest stress.", lambda s: bed_figures.displacement(s.cases)),
     Figure("fig09-porosity", "Porosity of horizontal slabs at the end, each sphere cut exactly (Fig. 9). The slabs at floor and "
            "top wall are left out.", lambda s: bed_figures.porosity(s.cases)),
-    Figure("fig10-section", "Vertical section through the upper part of the bed at three times close to each other (Fig. 10): contact pressure, "
+    Figure("fig10-section", "Vertical section through the upper part of the bed at the last snapshots of the shear (Fig. 10; times above the panels): contact pressure, "
            "rotation (black arrows), velocity (white), slip at contacts (green). Grains that spin along with the shear have a black rim.",
            lambda s: force_figures.section(s.shear.snapshots[-3:], s.one.normal_stress)),
     Figure("fig11-rotation", "Rotation of each free grain since shear began, about each axis (Fig. 11). Plus: mean.",
@@ -122,7 +122,19 @@ def run(args):
     formats = args.format.split(",")
     if bad := set(formats) - {"pdf", "svg", "png"}:
         raise MissingData(f"--format {','.join(sorted(bad))}: expected pdf, svg or png")
-    selection = Selection(find(args.CASE))
+    cases, early = find(args.CASE), {}
+    for case in cases:
+        try:
+            for stage in case.stages:
+                if stage.sheared:
+                    stage.series
+        except MissingData as why:
+            early[case] = why
+    if len(early) < len(cases):  # else each figure names what it lacks
+        for case, why in early.items():
+            print(f"left out: {why}")
+        cases = [c for c in cases if c not in early]
+    selection = Selection(cases)
     missing = draw(selection, args.output or Path(args.CASE[0]) / "figures", formats, [n for n in args.only.split(",") if n])
     if missing:
         print(f"{len(missing)} not drawn; see above", file=sys.stderr)

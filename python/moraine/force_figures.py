@@ -291,7 +291,7 @@ def sheared_bed(case):
     stage = sheared[-1]
     series, grains = stage.series, stage.snapshots[-1].grains
     x, r, moved = grains["position"], grains["radius"], grains["displacement"][:, 0]
-    colour = spheres.colours(moved / moved.max())
+    colour = spheres.colours(moved / (moved.max() or 1.0))
 
     figure = plt.figure(figsize=(page, 2.9))
     figure.subplots_adjust(left=0.01, right=0.98, top=0.95, bottom=0.14)
@@ -317,6 +317,6 @@ def sheared_bed(case):
     over.tick_params(labelbottom=False)
     under = figure.add_subplot(grid[1, 2], sharex=over)
     under.plot(series["shear_strain"], series["dilation_diameters"], color=ink, lw=0.7)
-    under.set(ylabel="dilation\n(diameters)", xlabel="shear strain", xlim=(0, series["shear_strain"].max()))
+    under.set(ylabel="dilation\n(diameters)", xlabel="shear strain", xlim=(0, series["shear_strain"].max() or None))
     figure.align_ylabels([over, under])
     return figure

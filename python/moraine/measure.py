@@ -6,6 +6,7 @@ import numpy as np
 
 from . import compaction, forces, profile, rotation, section, strength
 from .case import Case, MissingData
+from .progress import duration
 
 
 def runs(directory):
@@ -13,7 +14,7 @@ def runs(directory):
     found = [Case(p.parents[1]) for p in Path(directory).glob("seed-*/shear/sweep/*/output/case.toml")]
     if not found:
         raise MissingData(f"{directory}: there is no run; expected seed-*/shear/sweep/*/output")
-    return sorted(found, key=lambda c: (c.settings["grains"]["seed"], c.normal_stress))
+    return sorted(found, key=lambda c: (c.seed, c.normal_stress))
 
 
 def hours(case):
@@ -32,7 +33,7 @@ def strengths(case, until=None):
         rows = rows.rows(rows["shear_strain"] <= until)
     late = rows["shear_strain"] >= strength.late * s.strain
     return {
-        "seed": case.settings["grains"]["seed"], "sigma_0_kPa": shear.settings["normal_stress"] / 1e3, "strain": s.strain,
+        "seed": case.seed, "sigma_0_kPa": shear.settings["normal_stress"] / 1e3, "strain": s.strain,
         "friction_peak_raw": s.peak_raw, "strain_peak_raw": s.peak_raw_strain, "tau_peak_raw_kPa": s.tau_peak_raw / 1e3,
         "friction_peak": s.peak, "strain_peak": s.peak_strain,
         "friction_ultimate": s.ultimate, "friction_ultimate_std": s.ultimate_std,
@@ -43,8 +44,9 @@ def strengths(case, until=None):
 
 
 def tilt(tensor):
-    """Angle from the vertical of the axis of its largest principal value, degrees."""
-    return 90 - forces.maximum_compressive_direction(tensor)[1]
+    """Angle from the vertical of the axis of its largest principal value, degrees; positive where it dips towards +x."""
+    trend, plunge = forces.maximum_compressive_direction(tensor)
+    return np.copysign(90 - plunge, np.cos(np.radians(trend)))
 
 
 def strong_tilt(snapshot):
@@ -101,13 +103,23 @@ def force_chains(case, shear, consolidate):
     friction = rows["shear_friction"][rows["shear_strain"] >= strength.late * rows["shear_strain"][-1]].mean()
     return {"above_4_consolidated": forces.share_above(before, sigma_0),
             "above_4_sheared": np.mean([forces.share_above(x, sigma_0) for x in late]),
-            "strong_tilt_consolidated": strong_tilt(before), "strong_tilt_sheared": np.mean([strong_tilt(x) for x in late]),
+            "strong_tilt_consolidated": abs(strong_tilt(before)), "strong_tilt_sheared": np.mean([strong_tilt(x) for x in late]),
             "stress_tilt": np.mean([tilt(forces.stress_tensor(x)) for x in late]),
             "applied_tilt": np.degrees(np.arctan(friction))}
 
 
+def require_end(case):
+    """Raises MissingData where the shear has not come to its end: its ultimate state would be that of the strain it has."""
+    shear = case.stage("shear")
+    rows = shear.series
+    share = rows["stage_time"][-1] / duration(shear, rows["height"][0])
+    if share < 0.999:
+        raise MissingData(f"{case.directory}: the shear has come to {100 * share:.0f} % of its time; it is still running, or was cut off")
+
+
 def measure(case, say=print):
     """The strengths, and all that can be had from consolidation and snapshots; what lacks data is left out, and said."""
+    require_end(case)
     out = strengths(case)
     for part in (about, consolidation, profiles, rotations, force_chains):
         try:

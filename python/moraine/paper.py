@@ -3,8 +3,9 @@
 # Normal stresses of the experiments, Pa. The text gives their range (Table 1); the four between are those of Figs. 4, 8 and 9.
 normal_stresses = (10e3, 20e3, 40e3, 60e3, 80e3, 120e3)
 
+grains = 10_000
+
 sampling = 0.05         # s between two rows of the paper's series
-shear_strain_rate = 0.05  # 1/s
 total_shear_strain = 1.0  # 0.738 m over the height of the bed (caption of Fig. 8)
 
 # Mohr-Coulomb, par. 30 and Table 2: degrees, kPa; asymptotic standard errors
@@ -25,7 +26,5 @@ materials = {
 dilation = {"quartz sand": 2.0, "glass beads": 1.5, "DEM (paper)": 0.75}
 
 shear_zone_10kPa = 7        # mean grain diameters, par. 33
-strong_grains = 4           # times the confining stress, par. 31
 rotation_mean = (-0.0027, 0.50, -0.0053)  # rad, 80 kPa, par. 45 (which prints rad/s)
 rotation_variance = (0.76, 1.1, 0.68)     # rad^2
-inertia_number = {10e3: 7.5e-4, 120e3: 2.2e-4}  # par. 28

@@ -127,8 +127,7 @@ class Study:
 def toml(value):
     """A number or a truth value as it is, all else as a text."""
     try:
-        float(value)
-        return value
+        number = repr(float(value))
     except ValueError:
         return value if value in ("true", "false") else json.dumps(value)
-
+    return value if re.fullmatch(r"[-+]?(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d+)?", value) else number  # TOML knows no .5 and no 1.

@@ -1,7 +1,7 @@
 """The report of a study: what the paper states, what came out here, with intervals and verdicts; report.html and report.md.
 
 An interval is one of 95 %: of the Mohr-Coulomb values from the fit over all seeds and normal stresses (Student's t times the
-standard error), of everything else from the scatter over the seeds.
+standard error), of everything else from the scatter over the runs: over the seeds where a normal stress is named, else over all.
 """
 import base64
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ import platform
 import subprocess
 
 import numpy as np
-from scipy import stats
+from scipy import special, stats
 
 from . import figures, measure, paper
 from .case import MissingData
@@ -36,16 +36,22 @@ def mean_interval(values):
     return values.mean(), stats.t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / np.sqrt(len(values))
 
 
+def further_run(values):
+    """Half width of the interval, about their mean, that one more run falls into; nan for a single value. The paper has one
+    packing, whose values scatter as a single run's do here, however well the mean over many is known."""
+    return mean_interval(values)[1] * np.sqrt(len(values) + 1)
+
+
 def show(value, half, digits=2, unit=""):
     width = f" ± {half:.{digits}f}" if np.isfinite(half) else " (one run)"
     return f"{value:.{digits}f}{width}{unit}"
 
 
-def compare(value, half, reference, reference_half=0.0):
-    """Whether the intervals meet."""
+def compare(value, reference, half):
+    """half: half width of the 95 % interval of their difference."""
     if not np.isfinite(half):
         return "no interval"
-    if abs(value - reference) <= half + reference_half:
+    if abs(value - reference) <= half:
         return "agrees"
     return "higher" if value > reference else "lower"
 
@@ -64,15 +70,34 @@ def at(rows, sigma_0):
     return [r for r in rows if np.isclose(r["sigma_0_kPa"], sigma_0)]
 
 
+def trend(x, y, groups, draws=9999):
+    """Spearman's rank correlation, the probability of one at least as large by chance, and the least that probability can be.
+
+    By chance: the values of each group change places among themselves. A group is a packing, whose runs have more in common than
+    their normal stress; and the usual formula gives p = 0 for three values in order, of which every third triple is."""
+    x, y, groups = stats.rankdata(x), stats.rankdata(y), np.asarray(groups)
+    if np.ptp(y) == 0:
+        return 0.0, 1.0, 0.0
+    a, b = x - x.mean(), y - y.mean()
+    scale, random = np.sqrt((a**2).sum() * (b**2).sum()), np.random.default_rng(1)
+    chance, orders = np.zeros(draws), 1.0
+    for g in np.unique(groups):
+        own = groups == g
+        chance += random.permuted(np.tile(b[own], (draws, 1)), axis=1) @ a[own]
+        orders *= special.factorial(own.sum())
+    rank = (a * b).sum() / scale
+    return rank, (1 + np.sum(np.abs(chance) / scale >= abs(rank) - 1e-9)) / (1 + draws), 2 / orders
+
+
 def order(quantity, where, claim, rows, key, falling=False):
-    """Whether a column grows with the normal stress over all runs (or falls): Spearman's rank correlation."""
+    """Whether a column grows with the normal stress over all runs (or falls)."""
     x, y = column(rows, "sigma_0_kPa"), column(rows, key)
     if len(np.unique(x)) < 3 or not np.isfinite(y).all():
-        return Line(quantity, where, claim, "not measured at three normal stresses", "not tested")
-    rank, p = stats.spearmanr(x, y)
+        return Line(quantity, where, claim, "not measured in all runs, at three normal stresses or more", "not tested")
+    rank, p, least = trend(x, y, column(rows, "seed"))
     means = ", ".join(f"{y[x == s].mean():.2f}" for s in np.unique(x))
     right = rank < 0 if falling else rank > 0
-    verdict = "no trend to be seen" if not p < 0.05 else "holds" if right else "does not hold"
+    verdict = "too few runs to tell" if least > 0.05 else "no trend to be seen" if p > 0.05 else "holds" if right else "does not hold"
     return Line(quantity, where, claim, f"{means} (rank correlation {rank:+.2f}, p = {p:.1g})", verdict)
 
 
@@ -83,14 +108,15 @@ def strength_lines(rows):
         return
     peak = paper.phi_p, paper.phi_p_se, paper.C_p, paper.C_p_se
     ultimate = paper.phi_u, paper.phi_u_se, paper.C_u, paper.C_u_se
+    t = stats.t.ppf(0.975, len(paper.normal_stresses) - 2)  # of the paper's standard errors
     for key, how, (phi, phi_se, C, C_se) in (("peak", "smoothed", peak), ("peak_raw", "raw, rows of 0.05 s", peak),
                                              ("ultimate", "mean over the last third", ultimate)):
         fit, letter = fits[key], key[0]
         phi_half, C_half = fit.interval()
         yield Line(f"φ_{letter} ({how})", "par. 30, Table 2", f"{phi:g} ± {phi_se:g}° (s.e.)", show(fit.phi, phi_half, 2, "°"),
-                   compare(fit.phi, phi_half, phi, 2 * phi_se))
+                   compare(fit.phi, phi, np.hypot(phi_half, t * phi_se)))
         yield Line(f"C_{letter} ({how})", "par. 30, Table 2", f"{C:g} ± {C_se:g} kPa (s.e.)",
-                   show(fit.C / 1e3, C_half / 1e3, 2, " kPa"), compare(fit.C / 1e3, C_half / 1e3, C, 2 * C_se))
+                   show(fit.C / 1e3, C_half / 1e3, 2, " kPa"), compare(fit.C / 1e3, C, np.hypot(C_half / 1e3, t * C_se)))
 
 
 def dilation_lines(rows):
@@ -101,7 +127,7 @@ def dilation_lines(rows):
     if high := at(rows, 80):
         value, half = mean_interval(column(high, "dilation_d"))
         yield Line("dilation at 80 kPa", "par. 52", "about 0.75 diameters", show(value, half, 2, " diameters"),
-                   compare(value, half, paper.dilation["DEM (paper)"], 0.05))
+                   compare(value, paper.dilation["DEM (paper)"], further_run(column(high, "dilation_d")) + 0.05))
 
 
 def profile_lines(rows):
@@ -110,7 +136,7 @@ def profile_lines(rows):
         block = column(low, "shear_zone_integral_d").mean()
         yield Line("shear zone at 10 kPa, down to 5 % of the displacement", "par. 33, Fig. 8", "about 7 diameters, at the top",
                    f"{show(value, half, 1, ' diameters')} (as a block that moves with the layer: {block:.1f})",
-                   compare(value, half, paper.shear_zone_10kPa, 0.5))
+                   compare(value, paper.shear_zone_10kPa, further_run(column(low, "shear_zone_d")) + 0.5))
     yield order("shear zone (5 %, diameters) deepens with σ_0", "par. 33, Fig. 8", "order", rows, "shear_zone_d")
     yield order("highest porosity of a slab falls with σ_0", "par. 33, Fig. 9", "order", rows, "porosity_max", falling=True)
     yield order("its depth below the top wall (diameters) grows with σ_0", "par. 33, Fig. 9", "nearest the top at low stress", rows,
@@ -127,7 +153,7 @@ def force_lines(rows):
     tilt, half = mean_interval(column(rows, "strong_tilt_consolidated"))
     yield Line("strongest half of the contacts, consolidated: main direction", "par. 31, Fig. 7", "vertical",
                f"{show(tilt, half, 1, '°')} from the vertical", "holds" if tilt < 15 else "does not hold")
-    tilt, half = mean_interval(column(rows, "strong_tilt_sheared"))
+    tilt, half = mean_interval(column(rows, "strong_tilt_sheared"))  # positive: dipping towards +x
     applied, stress = column(rows, "applied_tilt").mean(), column(rows, "stress_tilt").mean()
     yield Line("the same in shear, towards the shear direction", "par. 31, Fig. 7", "along the maximum compressive stress σ' + τ",
                f"{show(tilt, half, 1, '°')} from the vertical; largest principal stress, from the contacts: {stress:.1f}°; σ' and τ "
@@ -143,26 +169,27 @@ def rotation_lines(rows):
                 value, half = mean_interval(column(high, key))
                 free = column(high, f"free_{key}").mean()
                 yield Line(f"{what} of the rotation about {axis} at 80 kPa, all grains", "par. 45, Fig. 11", f"{reference:g}{unit}",
-                           f"{show(value, half, digits, unit)} (free grains only: {free:.{digits}f})", compare(value, half, reference))
+                           f"{show(value, half, digits, unit)} (free grains only: {free:.{digits}f})", compare(value, reference, further_run(column(high, key))))
 
 
     if known(rows, "opposite_spins"):
         share, half = mean_interval(100 * column(rows, "opposite_spins"))
         yield Line("contacts whose grains spin against each other", "par. 44, Fig. 10", "grains prefer to roll in opposite directions",
-                   f"{show(share, half, 1, ' %')} (50 % if they did not)", "holds" if share - half > 50 else "does not hold")
+                   f"{show(share, half, 1, ' %')} (50 % if they did not)", "no interval" if np.isnan(half) else "holds" if share - half > 50 else "does not hold")
 
 
 def rate_lines(rows):
     if known(rows, "collapse_r2"):
-        time, r2, creep, creep_r2 = (column(rows, k).mean() for k in ("collapse_time_s", "collapse_r2", "creep_time_s", "creep_r2"))
+        time, creep = column(rows, "collapse_time_s").mean(), column(rows, "creep_time_s").mean()
+        r2, creep_r2 = column(rows, "collapse_r2").min(), column(rows, "creep_r2").min()
         yield Line("consolidation", "par. 29", "volumetric strain rate decays exponentially",
-                   f"collapse of the loose top with a time of {1e3 * time:.0f} ms (R² {r2:.3f}), then creep with {creep:.2f} s (R² {creep_r2:.3f})",
+                   f"collapse of the loose top with a time of {1e3 * time:.0f} ms (R² ≥ {r2:.3f}), then creep with {creep:.2f} s (R² ≥ {creep_r2:.3f})",
                    "holds, in two steps" if min(r2, creep_r2) > 0.9 else "does not hold")
     if known(rows, "inertia_number"):
         numbers = dict(zip(column(rows, "sigma_0_kPa"), column(rows, "inertia_number")))
         ends = " to ".join(f"{numbers[s]:.2g} ({s:g} kPa)" for s in sorted({min(numbers), max(numbers)}))
         yield Line("inertia number I (eq. 1)", "par. 28", "7.5e-4 (10 kPa) to 2.2e-4 (120 kPa)", ends,
-                   "cannot agree: eq. 1 with the values of Table 1 gives 5.1e-4 and 1.5e-4")
+                   "the paper's own Table 1 gives 5.1e-4 and 1.5e-4 by eq. 1")
 
 
 def quantities(rows):
@@ -188,7 +215,7 @@ compared = {"friction_peak_raw": "peak friction, raw", "friction_peak": "peak fr
 def variant(main_cases, name, cases):
     """Or nothing, where no seed and normal stress are common to both."""
     def key(case):
-        return case.settings["grains"]["seed"], case.normal_stress
+        return case.seed, case.normal_stress
     main = {key(c): c for c in main_cases}
     pairs = [(main[key(c)], c) for c in cases if key(c) in main]
     if not pairs:
@@ -219,6 +246,17 @@ def version():
     root = Path(__file__).resolve().parents[2]
     git = subprocess.run(["git", "-C", str(root), "describe", "--always", "--dirty"], capture_output=True, text=True)
     return git.stdout.strip() if git.returncode == 0 else "unknown"
+
+
+def differs(rows):
+    """What sets these runs apart from the paper's, whatever their settings; empty if nothing."""
+    grains, strain = column(rows, "grains").min(), column(rows, "strain").min()
+    small = f"{grains:,.0f} grains instead of {paper.grains:,}" if grains < paper.grains else ""
+    short = f"a shear strain of {strain:.2f} instead of {paper.total_shear_strain:g}" if strain < 0.99 * paper.total_shear_strain else ""
+    if not small + short:
+        return ""
+    return f"These runs have {' and '.join(filter(None, (small, short)))}, so a difference from the paper may come from that alone" + \
+        (": ultimate strength, dilation, shear zone and rotation are those of this strain." if short else ".")
 
 
 class Report:
@@ -271,6 +309,8 @@ figure {{ margin: 2em 0; }} figure img {{ max-width: 100%; }} figcaption {{ font
 def build(study, output, notes=None, say=print):
     """study: directory of runs (runs/NAME). Writes measurements.csv, variants.csv, figures/, report.html, report.md to `output`."""
     study, output = Path(study), Path(output)
+    if notes and not Path(notes).is_file():
+        raise MissingData(f"there is no file {notes}")
     output.mkdir(parents=True, exist_ok=True)
     cases = measure.runs(study)
     say(f"measuring {len(cases)} runs")
@@ -280,10 +320,14 @@ def build(study, output, notes=None, say=print):
         left_out.append(why)
         say(why)
 
-    rows = []
+    rows, measured = [], []
     for case in cases:
+        if any((case.seed, case.normal_stress) == (c.seed, c.normal_stress) for c in measured):
+            note(f"left out: {case.directory}: has the seed and the normal stress of another run")
+            continue
         try:
             rows.append(measure.measure(case, note))
+            measured.append(case)
         except MissingData as why:
             note(f"left out: {why}")
     if not rows:
@@ -296,10 +340,14 @@ def build(study, output, notes=None, say=print):
     first = rows[0]
     text.paragraph(f"{len(rows)} runs of {first.get('grains', '?')} grains: normal stress {', '.join(f'{s:g}' for s in stresses)} kPa, "
                    f"seeds {', '.join(map(str, seeds))}, preset {first.get('preset')} (f = {first.get('f', np.nan):g}, k_n = {first.get('k_n', np.nan):.3g} N/m), sheared "
-                   f"to a strain of {min(r['strain'] for r in rows):.2f}. {first.get('program', 'moraine').split(',')[0]}, version {version()}, on {machine()}; "
-                   f"{np.nansum(column(rows, 'hours')):.1f} hours of runs, several at once. {date.today()}.")
-    text.paragraph("± is half of a 95 % interval: of φ and C from the Levenberg-Marquardt fit over all runs, of all else from the scatter "
-                   "over the seeds. The paper's ± is its standard error. Single runs are in measurements.csv.")
+                   f"to a strain of {min(r['strain'] for r in rows):.2f}. {first.get('program', 'moraine').split(',')[0]}, {np.nansum(column(rows, 'hours')):.1f} hours of "
+                   f"runs, several at once. This report: version {version()}, on {machine()}, {date.today()}.")
+    if unlike := differs(rows):
+        text.paragraph(unlike)
+    text.paragraph("± is half of a 95 % interval: of φ and C from the Levenberg-Marquardt fit over all runs, of all else from the scatter over "
+                   "the runs: those of the normal stress that is named, else all. The paper's ± is its standard error. φ and C agree where the "
+                   "difference lies within the intervals of both, added in squares; what the paper has of one run, where one more run here "
+                   "would come out like it with a probability of 95 %. Single runs are in measurements.csv.")
     text.heading("The paper's numbers and these")
     lines = quantities(rows)
     text.table(["quantity", "paper", "here", "verdict", "where"], [[x.quantity, x.paper, x.ours, x.verdict, x.where] for x in lines])
@@ -309,7 +357,7 @@ def build(study, output, notes=None, say=print):
     variants = []
     for other in sorted(p for p in study.parent.iterdir() if p.is_dir() and p != study):
         try:
-            variants.append(variant(cases, other.name, measure.runs(other)))
+            variants.append(variant(measured, other.name, measure.runs(other)))
         except MissingData:
             continue
     if variants := [v for v in variants if v]:
@@ -320,11 +368,13 @@ def build(study, output, notes=None, say=print):
         text.table(["settings", "runs", "up to strain", *compared.values()],
                    [[v.name, v.runs, f"{v.strain:.2f}"] + [f"{a:.3f}, {b:.3f}" + (f" (±{h:.3f})" if np.isfinite(h) else "")
                                                            for a, b, h in v.values.values()] for v in variants])
-    if notes and Path(notes).exists():
+    if notes:
         add_notes(text, Path(notes).read_text())
 
     text.heading("Figures")
-    missing = figures.draw(figures.Selection(cases), output / "figures", ("svg", "png", "pdf"), say=say)
+    selection = figures.Selection(measured)
+    text.paragraph(f"Where a figure shows one run, it is that of {selection.one.normal_stress / 1e3:g} kPa and seed {selection.one.seed}.")
+    missing = figures.draw(selection, output / "figures", ("svg", "png", "pdf"), say=say)
     for figure in figures.all_figures:
         if figure.name in missing:
             text.paragraph(f"{figure.name} is not drawn: {missing[figure.name]}")

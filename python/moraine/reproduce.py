@@ -1,5 +1,6 @@
 """./moraine reproduce NAME: runs the study of cases/NAME/Snakefile, what is missing of it, and ends with figures and a report."""
 from pathlib import Path
+import fcntl
 import os
 import re
 import shutil
@@ -49,6 +50,8 @@ def study_of(args):
             stresses = value if "," in value else value + ","
         elif key in ("seed", "grains.seed", "preset", "model.preset"):
             raise MissingData(f"--set {text}: give --{key.rpartition('.')[2].replace('seed', 'seeds')} instead")
+        elif key.endswith(".normal_stress"):
+            raise MissingData(f"--set {text}: give --set normal_stress={value}, which holds for all stages")
         elif "." not in key:
             raise MissingData(f"--set {text}: expected the full name of the key, such as wall.mass; ./moraine keys lists them")
         else:
@@ -56,6 +59,20 @@ def study_of(args):
     return paper2013.Study(args.preset, seeds(args.seeds), stresses, args.quick, settings, args.settled,
                            str(Path(args.output).resolve()) if args.output else "", gpu=args.gpu,
                            moraine=os.environ.get("MORAINE_LAUNCHER", str(root / "moraine")))
+
+
+def hold(home, study):
+    """Open files that keep other commands off this study and its settled beds; the system lets go of them however this one ends."""
+    held = []
+    for name in sorted({study.name, study.bed}):
+        directory = home / "runs" / name
+        directory.mkdir(parents=True, exist_ok=True)
+        held.append((directory / ".lock").open("w"))
+        try:
+            fcntl.flock(held[-1], fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise MissingData(f"{directory} is in use by another reproduce; wait for its end") from None
+    return held
 
 
 def run(args):
@@ -66,13 +83,15 @@ def run(args):
     if not snakemake:
         raise MissingData("snakemake is not installed (Debian: apt-get install snakemake)")
     study = study_of(args)
+    held = [] if args.dry_run else hold(home, study)
     command = [snakemake, "--snakefile", "Snakefile", "--cores", str(args.cores), "--configfile", str(study.write_config(home)),
                # What has been computed stays valid when only words of the workflow change.
-               "--rerun-triggers", "mtime", "--keep-going", "--rerun-incomplete"]
+               "--rerun-triggers", "mtime", "--keep-going", "--rerun-incomplete",
+               "--nolock"]  # Snakemake's own lock outlives a power cut, and then wants to be removed by hand
     if args.dry_run:
         command.append("--dry-run")
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [str(root / "python"), os.environ.get("PYTHONPATH")]))}
-    status = subprocess.run(command, cwd=home, env=environment).returncode
+    status = subprocess.run(command, cwd=home, env=environment, pass_fds=[f.fileno() for f in held]).returncode
     if status == 0 and not args.dry_run:
         print(f"report: {home / 'runs' / study.name / 'results' if not args.output else Path(args.output)}/report.html")
     return status

@@ -12,6 +12,7 @@ import numpy as np
 from scipy import optimize, stats
 
 from . import paper
+from .case import MissingData
 
 window = 0.02       # of shear strain, over which the smoothed peak is a mean
 late = 2 / 3        # of the strain at the end: where the ultimate state begins
@@ -45,9 +46,9 @@ def smoothed(strain, values, width=window):
 
 
 def every(times, interval):
-    """Indices of the rows nearest to 0, interval, 2 interval, ..."""
-    wanted = np.arange(times[0], times[-1] + 1e-9 * interval, interval)
-    return np.unique(np.clip(np.searchsorted(times, wanted - 1e-6 * interval), 0, len(times) - 1))
+    """Indices of the rows nearest to 0, interval, 2 interval, ... A row may lie half a time step before or after its time."""
+    wanted = np.arange(times[0], times[-1] + 1e-3 * interval, interval)
+    return np.unique(np.searchsorted((times[1:] + times[:-1]) / 2, wanted))
 
 
 def strength(stage, sampling=paper.sampling, until=None):
@@ -58,6 +59,8 @@ def strength(stage, sampling=paper.sampling, until=None):
     strain, friction, dilation = rows["shear_strain"], rows["shear_friction"], rows["dilation_diameters"]
     raw = every(rows["stage_time"], sampling)
     raw = raw[strain[raw] > 0]
+    if not len(raw):
+        raise MissingData(f"{rows.file}: no row {sampling:g} s after the shear began")
     top = raw[np.argmax(friction[raw])]
     mean = smoothed(strain, friction)
     best = int(np.nanargmax(mean)) if np.isfinite(mean).any() else top

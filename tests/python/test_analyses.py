@@ -55,6 +55,18 @@ def test_raw_and_smoothed_peaks_of_a_known_curve():
     assert s.tau_peak_raw == pytest.approx(80e3 * friction.max(), rel=1e-3)
 
 
+def test_rows_half_a_step_off_their_time_are_still_the_nearest():
+    times = 0.01 * np.arange(1001) + np.where(np.arange(1001) % 2, 2e-6, -2e-6)
+    times[0] = 0
+    assert np.array_equal(strength.every(times, 0.05), np.arange(0, 1001, 5))
+    assert np.array_equal(strength.every(times[::5], 0.05), np.arange(201))
+
+
+def test_a_shear_that_has_only_begun_has_no_peak():
+    with pytest.raises(MissingData, match="series.h5: no row 0.05 s after the shear began"):
+        strength.strength(stage([0, 0.0005], [0, 0.1], [0, 0]))
+
+
 def test_reading_up_to_a_strain():
     x = np.linspace(0, 1, 2001)
     s = strength.strength(stage(x, x, x), until=0.5)

@@ -1,12 +1,17 @@
 """The study of the paper: where its runs lie, what they are, and the words of its report."""
+import contextlib
+import shutil
 import tomllib
 
 import numpy as np
 import pytest
 
-from moraine import report
-from moraine.case import MissingData
-from moraine.paper2013 import Study, stress_names
+from conftest import root
+from fake_case import FakeCase
+from moraine import measure, report, reproduce
+from moraine.__main__ import main
+from moraine.case import Case, MissingData
+from moraine.paper2013 import Study, stress_names, toml
 from moraine.reproduce import seeds
 
 
@@ -49,6 +54,18 @@ def test_the_same_word_twice_keeps_its_table():
     assert study.name == "fast+contact.gamma_n-200Nsm+wall.gamma_n-0"
 
 
+def test_values_are_toml():
+    assert [toml(v) for v in ("0.5", ".5", "1.", "-3", "05", "1e-3", "64 kg", "true")] == \
+        ["0.5", "0.5", "1.0", "-3", "5.0", "1e-3", '"64 kg"', "true"]
+    for text in map(toml, (".5", "1.", "-0", "1e5", "+3", "inf", "64 kg", 'a "b"')):
+        tomllib.loads(f"x = {text}")
+
+
+def test_normal_stresses_are_those_of_the_sweep(capsys):
+    assert main(["reproduce", "paper-2013", "--set", "stage.shear.normal_stress=40kPa", "--dry-run"]) == 1
+    assert "give --set normal_stress=40kPa" in capsys.readouterr().err
+
+
 def test_beds_of_another_study():
     study = Study(preset="paper", seeds=[1], settled="fast")
     (directory, text), = study.case_files()
@@ -72,6 +89,33 @@ def test_the_configuration_survives_being_written(tmp_path):
     study = Study(seeds=[1, 2], quick=True, settings={"wall.mass": "64 kg"})
     file = study.write_config(tmp_path)
     assert Study.from_config(json.loads((tmp_path / file).read_text())).name == study.name == "quick+mass-64kg"
+
+
+@pytest.mark.skipif(not shutil.which("snakemake"), reason="snakemake is not installed")
+def test_what_the_workflow_runs(tmp_path, monkeypatch):
+    """With a launcher that only notes its arguments, in a directory whose name has a space."""
+    home = tmp_path / "a copy"
+    shutil.copytree(root / "cases/paper-2013", home / "cases/paper-2013", ignore=shutil.ignore_patterns("runs", ".snakemake", "results"))
+    launcher, calls = home / "moraine", home / "calls"
+    launcher.write_text(f"""#!/bin/sh\nprintf '%s|' "$@" >>'{calls}'\necho >>'{calls}'\n""")
+    launcher.chmod(0o755)
+    (home / "python").symlink_to(root / "python")
+    monkeypatch.setattr(reproduce, "root", home)
+    monkeypatch.delenv("MORAINE_LAUNCHER", raising=False)
+    assert main(["reproduce", "paper-2013", "--seeds", "1", "--cores", "1"]) != 0  # the report finds no run
+    assert calls.read_text().splitlines() == [
+        "run|runs/fast/seed-1/settle|--resume|--threads|1|--backend|cpu|",
+        "sweep|runs/fast/seed-1/shear|--set|normal_stress=10,20,40,60,80,120 kPa|--resume|--threads|1|--backend|cpu|"]
+
+
+def test_two_at_once_do_not_share_a_bed(tmp_path):
+    with contextlib.ExitStack() as stack:
+        for file in reproduce.hold(tmp_path, Study(seeds=[1])):
+            stack.enter_context(file)
+        with pytest.raises(MissingData, match="runs/fast is in use by another reproduce"):
+            reproduce.hold(tmp_path, Study(seeds=[1], settings={"wall.mass": "64 kg"}))
+        reproduce.hold(tmp_path, Study(preset="paper"))
+    reproduce.hold(tmp_path, Study(seeds=[1], settings={"wall.mass": "64 kg"}))
 
 
 def test_seeds():
@@ -105,9 +149,51 @@ def test_verdicts_follow_the_numbers():
     assert find(lines, "mean of the rotation about x").verdict == "agrees"
 
 
+def test_a_trend_is_no_stronger_than_its_runs():
+    assert report.trend([1, 2, 3], [1, 2, 3], [1, 1, 1])[:2] == pytest.approx((1, 1 / 3), abs=0.02)  # of 6 orders, 2
+    assert report.trend(range(6), range(6), [1] * 6)[:2] == pytest.approx((1, 2 / 720), abs=2e-3)
+    rank, p, _ = report.trend([1, 2, 3] * 2, [1, 2, 3, 11, 12, 13], [1, 1, 1, 2, 2, 2])  # packings that differ hide no trend
+    assert rank < 0.6 and p == pytest.approx(2 / 36, abs=0.01)
+    three = [r for r in rows(count=1) if r["sigma_0_kPa"] in (20, 80, 120)]
+    assert find(report.quantities(three), "strain at the smoothed peak").verdict == "too few runs to tell"
+
+
 def test_one_run_gives_no_interval():
     lines = report.quantities(rows(count=1))
     assert find(lines, "dilation at 80 kPa").verdict == "no interval"
+
+
+def test_directions_have_a_sign():
+    along, against = (measure.tilt(np.outer(v, v)) for v in ([1.0, 0, -1], [-1.0, 0, -1]))
+    assert along == pytest.approx(45) and against == pytest.approx(-45)
+    chains = {"above_4_sheared": 0.1, "above_4_consolidated": 0.1, "strong_tilt_consolidated": 3.0, "applied_tilt": 20.0, "stress_tilt": 40.0}
+    for tilt, verdict in ((40, "along the principal stress"), (20, "holds"), (-20, "does not hold")):
+        lines = report.quantities([r | chains | {"strong_tilt_sheared": tilt} for r in rows()])
+        assert find(lines, "the same in shear").verdict == verdict
+
+
+def test_one_run_cannot_tell_how_grains_roll():
+    lines = report.quantities([r | {"opposite_spins": 0.6} for r in rows(count=1)[:1]])
+    assert find(lines, "contacts whose grains spin").verdict == "no interval"
+
+
+def test_what_sets_the_runs_apart_is_said():
+    def said(**what):
+        return report.differs([r | {"grains": 10000, "strain": 1.0} | what for r in rows()])
+    assert said() == ""
+    assert "1,000 grains instead of 10,000, so" in said(grains=1000)
+    assert "grains" not in said(strain=0.1) and "a shear strain of 0.10 instead of 1" in said(strain=0.1)
+    assert "10,000 and a shear strain" in said(grains=1000, strain=0.1)
+
+
+def test_a_run_under_way_is_left_out(tmp_path):
+    case = FakeCase(tmp_path / "case")
+    history = case.history()
+    case.write(history)
+    measure.require_end(Case(case.directory))
+    case.write(history[:-30])
+    with pytest.raises(MissingData, match="the shear has come to 8. % of its time"):
+        measure.require_end(Case(case.directory))
 
 
 def test_what_was_not_measured_is_left_out():
@@ -122,8 +208,15 @@ def test_mean_and_interval():
     assert np.isnan(report.mean_interval([1.0])[1])
 
 
+def test_the_paper_s_one_run_may_lie_where_a_further_run_would():
+    rng, inside = np.random.default_rng(3), 0
+    for _ in range(2000):
+        values, other = rng.normal(size=4), rng.normal()
+        inside += report.compare(values.mean(), other, report.further_run(values)) == "agrees"
+    assert inside / 2000 == pytest.approx(0.95, abs=0.015)
+
+
 def test_table_survives_being_written(tmp_path):
-    from moraine import measure
     file = tmp_path / "m.csv"
     measure.table(rows(), file)
     again = measure.read_table(file)
