@@ -44,6 +44,7 @@ class Figure:
     name: str
     caption: str
     draw: Callable[[Selection], object]  # gives a Matplotlib figure
+    many: bool = False  # whether it makes sense only for several normal stresses
 
 
 all_figures = (
@@ -71,7 +72,7 @@ all_figures = (
     Figure("fig13-laboratory", "Shear stress and dilation beside what the paper's text states of real materials (Fig. 13, Table 2, par. 52).",
            lambda s: bed_figures.laboratory(s.alike)),
     Figure("fig14-mohr-coulomb", "Mohr-Coulomb lines (Fig. 14, Table 2). Circles: each run, smoothed peak and ultimate; crosses: raw peaks.",
-           lambda s: bed_figures.mohr_coulomb([measure.strengths(c) for c in s.cases])),
+           lambda s: bed_figures.mohr_coulomb([measure.strengths(c) for c in s.cases]), many=True),
     Figure("consolidation", "Consolidation: volumetric strain, and what is still to come of it, with exponential fits to the collapse of the "
            "loose top and to the creep after it (par. 29).", lambda s: bed_figures.consolidation(s.cases)),
     Figure("sheared-bed", "The bed, the displacement in it, its friction and its dilation.", lambda s: force_figures.sheared_bed(s.one)),
@@ -85,6 +86,10 @@ def draw(selection, directory, formats=("pdf", "svg", "png"), only=(), say=print
         raise MissingData(f"no figure {', '.join(sorted(unknown))}; there are {', '.join(f.name for f in all_figures)}")
     missing = {}
     for figure in all_figures:
+        if figure.many and not only and len({c.normal_stress for c in selection.cases}) < 2:
+            missing[figure.name] = "it needs cases of several normal stresses"
+            say(f"{figure.name}: left out: {missing[figure.name]}")
+            continue
         if only and figure.name not in only:
             continue
         try:
@@ -136,6 +141,7 @@ def run(args):
         cases = [c for c in cases if c not in early]
     selection = Selection(cases)
     missing = draw(selection, args.output or Path(args.CASE[0]) / "figures", formats, [n for n in args.only.split(",") if n])
-    if missing:
-        print(f"{len(missing)} not drawn; see above", file=sys.stderr)
-    return 1 if missing else 0
+    failed = [f.name for f in all_figures if f.name in missing and not (f.many and len(cases) == 1)]
+    if failed:
+        print(f"not drawn, see above: {', '.join(failed)}", file=sys.stderr)
+    return 1 if failed else 0

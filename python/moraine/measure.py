@@ -9,9 +9,16 @@ from .case import Case, MissingData
 from .progress import duration
 
 
-def runs(directory):
-    """The cases of a study that have been sheared, in order of seed and normal stress."""
-    found = [Case(p.parents[1]) for p in Path(directory).glob("seed-*/shear/sweep/*/output/case.toml")]
+def runs(directory, say=print):
+    """The cases of a study that have been begun, in order of seed and normal stress."""
+    found = []
+    for file in sorted(Path(directory).glob("seed-*/shear/sweep/*/output/case.toml")):
+        try:
+            case = Case(file.parents[1])
+            case.seed, case.normal_stress  # what they are sorted by
+            found.append(case)
+        except MissingData as why:
+            say(f"left out: {why}")
     if not found:
         raise MissingData(f"{directory}: there is no run; expected seed-*/shear/sweep/*/output")
     return sorted(found, key=lambda c: (c.seed, c.normal_stress))
@@ -56,10 +63,11 @@ def strong_tilt(snapshot):
 
 
 def about(case, shear, consolidate):
+    rate = shear.settings["strain_rate"] or shear.settings["velocity"] / shear.series["height"][0]
     return {"preset": case.settings["model"]["preset"], "f": shear.settings["f"],
             "k_n": case.settings["contact"]["k_n"] / case.settings["model"]["softening"],
             "grains": len(shear.snapshots[-1].grains), "hours": hours(case), "program": case.text.partition("\n")[0].lstrip("# "),
-            "inertia_number": compaction.inertia_number(shear.settings["strain_rate"], case.diameter / 2,
+            "inertia_number": compaction.inertia_number(rate, case.diameter / 2,
                                                         case.settings["grains"]["density"], shear.settings["normal_stress"])}
 
 
@@ -156,3 +164,14 @@ def mohr_coulomb(rows):
     sigma_0 = np.array([r["sigma_0_kPa"] for r in rows]) * 1e3
     return {what: strength.mohr_coulomb(sigma_0, sigma_0 * [r[key] for r in rows]) for what, key in
             (("peak", "friction_peak"), ("peak_raw", "friction_peak_raw"), ("ultimate", "friction_ultimate"))}
+
+
+def mohr_coulomb_by_seed(rows):
+    """The same for the runs of each seed alone: a list of such dictionaries, of the seeds that have enough normal stresses."""
+    fits = []
+    for seed in sorted({r["seed"] for r in rows}):
+        try:
+            fits.append(mohr_coulomb([r for r in rows if r["seed"] == seed]))
+        except ValueError:
+            continue
+    return fits

@@ -106,17 +106,22 @@ def strength_lines(rows):
         fits = measure.mohr_coulomb(rows)
     except ValueError:
         return
-    peak = paper.phi_p, paper.phi_p_se, paper.C_p, paper.C_p_se
-    ultimate = paper.phi_u, paper.phi_u_se, paper.C_u, paper.C_u_se
+    each = measure.mohr_coulomb_by_seed(rows)
+    peak = paper.phi_p, paper.phi_p_se, paper.C_p, paper.C_p_se, 0.5, 0.05  # the last two: half of the last digit printed
+    ultimate = paper.phi_u, paper.phi_u_se, paper.C_u, paper.C_u_se, 0.5, 0.005
     t = stats.t.ppf(0.975, len(paper.normal_stresses) - 2)  # of the paper's standard errors
-    for key, how, (phi, phi_se, C, C_se) in (("peak", "smoothed", peak), ("peak_raw", "raw, rows of 0.05 s", peak),
-                                             ("ultimate", "mean over the last third", ultimate)):
+    for key, how, (phi, phi_se, C, C_se, phi_digit, C_digit) in (
+            ("peak", "smoothed", peak), ("peak_raw", "raw, rows of 0.05 s", peak), ("ultimate", "mean over the last third", ultimate)):
         fit, letter = fits[key], key[0]
         phi_half, C_half = fit.interval()
-        yield Line(f"φ_{letter} ({how})", "par. 30, Table 2", f"{phi:g} ± {phi_se:g}° (s.e.)", show(fit.phi, phi_half, 2, "°"),
-                   compare(fit.phi, phi, np.hypot(phi_half, t * phi_se)))
-        yield Line(f"C_{letter} ({how})", "par. 30, Table 2", f"{C:g} ± {C_se:g} kPa (s.e.)",
-                   show(fit.C / 1e3, C_half / 1e3, 2, " kPa"), compare(fit.C / 1e3, C, np.hypot(C_half / 1e3, t * C_se)))
+        for name, value, half, reference, se, digit, unit, own in (
+                ("φ", fit.phi, phi_half, phi, phi_se, phi_digit, "°", [f[key].phi for f in each]),
+                ("C", fit.C / 1e3, C_half / 1e3, C, C_se, C_digit, " kPa", [f[key].C / 1e3 for f in each])):
+            alone = f"; each seed alone: {show(*mean_interval(own), 2, unit)}" if len(each) > 1 else ""
+            yield Line(f"{name}_{letter} ({how})", "par. 30, Table 2", f"{reference:g} ± {se:g}{unit} (s.e.)",
+                       show(value, half, 2, unit) + alone, compare(value, reference, np.hypot(half, t * se) + digit))
+    yield order("peak friction falls with σ_0", "par. 29, Fig. 4", "it depends on σ_0", rows, "friction_peak", falling=True)
+    yield order("ultimate friction falls with σ_0", "par. 29, Fig. 4", "it depends on σ_0", rows, "friction_ultimate", falling=True)
 
 
 def dilation_lines(rows):
@@ -155,10 +160,11 @@ def force_lines(rows):
                f"{show(tilt, half, 1, '°')} from the vertical", "holds" if tilt < 15 else "does not hold")
     tilt, half = mean_interval(column(rows, "strong_tilt_sheared"))  # positive: dipping towards +x
     applied, stress = column(rows, "applied_tilt").mean(), column(rows, "stress_tilt").mean()
-    yield Line("the same in shear, towards the shear direction", "par. 31, Fig. 7", "along the maximum compressive stress σ' + τ",
+    yield Line("the same in shear, towards the shear direction", "par. 31, Fig. 7", "along the maximum compressive stress σ' + τ; subhorizontal",
                f"{show(tilt, half, 1, '°')} from the vertical; largest principal stress, from the contacts: {stress:.1f}°; σ' and τ "
-               f"added as vectors: {applied:.1f}°",
-               "along the principal stress" if abs(tilt - stress) < 5 else "holds" if abs(tilt - applied) < 5 else "does not hold")
+               f"added as vectors, as the paper has it: {applied:.1f}°",
+               "along the largest principal stress, not the paper's sum" if abs(tilt - stress) < 5 < abs(tilt - applied)
+               else "holds" if abs(tilt - applied) < 5 else "does not hold")
 
 
 def rotation_lines(rows):
@@ -169,13 +175,13 @@ def rotation_lines(rows):
                 value, half = mean_interval(column(high, key))
                 free = column(high, f"free_{key}").mean()
                 yield Line(f"{what} of the rotation about {axis} at 80 kPa, all grains", "par. 45, Fig. 11", f"{reference:g}{unit}",
-                           f"{show(value, half, digits, unit)} (free grains only: {free:.{digits}f})", compare(value, reference, further_run(column(high, key))))
-
-
+                           f"{show(value, half, digits, unit)} (free grains only: {free:.{digits}f})",
+                           compare(value, reference, further_run(column(high, key))))
     if known(rows, "opposite_spins"):
         share, half = mean_interval(100 * column(rows, "opposite_spins"))
         yield Line("contacts whose grains spin against each other", "par. 44, Fig. 10", "grains prefer to roll in opposite directions",
-                   f"{show(share, half, 1, ' %')} (50 % if they did not)", "no interval" if np.isnan(half) else "holds" if share - half > 50 else "does not hold")
+                   f"{show(share, half, 1, ' %')} (50 % if they did not)",
+                   "no interval" if np.isnan(half) else "holds" if share - half > 50 else "does not hold")
 
 
 def rate_lines(rows):
@@ -312,14 +318,14 @@ def build(study, output, notes=None, say=print):
     if notes and not Path(notes).is_file():
         raise MissingData(f"there is no file {notes}")
     output.mkdir(parents=True, exist_ok=True)
-    cases = measure.runs(study)
-    say(f"measuring {len(cases)} runs")
     left_out = []
 
     def note(why):
         left_out.append(why)
         say(why)
 
+    cases = measure.runs(study, note)
+    say(f"measuring {len(cases)} runs")
     rows, measured = [], []
     for case in cases:
         if any((case.seed, case.normal_stress) == (c.seed, c.normal_stress) for c in measured):
@@ -339,14 +345,15 @@ def build(study, output, notes=None, say=print):
     text.heading("Damsgaard et al. (2013), reproduced", 1)
     first = rows[0]
     text.paragraph(f"{len(rows)} runs of {first.get('grains', '?')} grains: normal stress {', '.join(f'{s:g}' for s in stresses)} kPa, "
-                   f"seeds {', '.join(map(str, seeds))}, preset {first.get('preset')} (f = {first.get('f', np.nan):g}, k_n = {first.get('k_n', np.nan):.3g} N/m), sheared "
+                   f"seeds {', '.join(map(str, seeds))}, preset {first.get('preset')} (f = "
+                   f"{first.get('f', np.nan):g}, k_n = {first.get('k_n', np.nan):.3g} N/m), sheared "
                    f"to a strain of {min(r['strain'] for r in rows):.2f}. {first.get('program', 'moraine').split(',')[0]}, {np.nansum(column(rows, 'hours')):.1f} hours of "
-                   f"runs, several at once. This report: version {version()}, on {machine()}, {date.today()}.")
+                   f"runs, settling apart, several at once. This report: version {version()}, on {machine()}, {date.today()}.")
     if unlike := differs(rows):
         text.paragraph(unlike)
     text.paragraph("± is half of a 95 % interval: of φ and C from the Levenberg-Marquardt fit over all runs, of all else from the scatter over "
                    "the runs: those of the normal stress that is named, else all. The paper's ± is its standard error. φ and C agree where the "
-                   "difference lies within the intervals of both, added in squares; what the paper has of one run, where one more run here "
+                   "difference lies within the intervals of both, added in squares, and half of the paper's last digit; what the paper has of one run, where one more run here "
                    "would come out like it with a probability of 95 %. Single runs are in measurements.csv.")
     text.heading("The paper's numbers and these")
     lines = quantities(rows)
@@ -357,14 +364,15 @@ def build(study, output, notes=None, say=print):
     variants = []
     for other in sorted(p for p in study.parent.iterdir() if p.is_dir() and p != study):
         try:
-            variants.append(variant(measured, other.name, measure.runs(other)))
+            same = [c for c in measure.runs(other) if c.settings["grains"]["count"] == measured[0].settings["grains"]["count"]]
+            variants.append(variant(measured, other.name, same))
         except MissingData:
             continue
     if variants := [v for v in variants if v]:
         measure.table([row for v in variants for row in v.rows], output / "variants.csv")
         text.heading("Tests of causes")
         text.paragraph("Each line is a study with other settings, named after them, against the runs above with the same seeds and normal "
-                       "stresses, both read up to the same strain. Values: here, there; ± of the difference where there are several runs.")
+                       "stresses, both read up to the same strain: what is called the last third is that of this strain. Those with settings of settle have beds of their own. Values: here, there; ± of the difference where there are several runs.")
         text.table(["settings", "runs", "up to strain", *compared.values()],
                    [[v.name, v.runs, f"{v.strain:.2f}"] + [f"{a:.3f}, {b:.3f}" + (f" (±{h:.3f})" if np.isfinite(h) else "")
                                                            for a, b, h in v.values.values()] for v in variants])

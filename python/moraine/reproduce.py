@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import sys
 
-from . import paper2013
+from .study import Study, stresses as paper_stresses
 from .case import MissingData
 
 root = Path(__file__).resolve().parents[2]
@@ -21,7 +21,7 @@ def arguments(parser):
     parser.add_argument("NAME", help=f"a directory in cases/ with a Snakefile: {', '.join(studies())}")
     parser.add_argument("--preset", default="fast", choices=("paper", "standard", "fast"),
                         help="accuracy against time (default: %(default)s)")
-    parser.add_argument("--seeds", default="3", help="how many random packings, or which: 4,5,6 (default: %(default)s)")
+    parser.add_argument("--seeds", help="how many random packings, or which: 4,5,6 (default: 3; with --quick 2)")
     parser.add_argument("--quick", action="store_true", help="1,000 grains instead of 10,000: minutes instead of hours")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="sets",
                         help="override a key of case.toml, by its full name: --set wall.mass=64kg; makes a study beside the one without. "
@@ -41,7 +41,7 @@ def seeds(text):
 
 
 def study_of(args):
-    settings, stresses = {}, paper2013.stresses
+    settings, stresses = {}, paper_stresses
     for text in args.sets:
         key, equals, value = text.partition("=")
         if not equals or not value:
@@ -56,7 +56,7 @@ def study_of(args):
             raise MissingData(f"--set {text}: expected the full name of the key, such as wall.mass; ./moraine keys lists them")
         else:
             settings[key] = value
-    return paper2013.Study(args.preset, seeds(args.seeds), stresses, args.quick, settings, args.settled,
+    return Study(args.preset, seeds(args.seeds or ("2" if args.quick else "3")), stresses, args.quick, settings, args.settled,
                            str(Path(args.output).resolve()) if args.output else "", gpu=args.gpu,
                            moraine=os.environ.get("MORAINE_LAUNCHER", str(root / "moraine")))
 
@@ -75,6 +75,16 @@ def hold(home, study):
     return held
 
 
+def check(home, study):
+    """Keys and values, before hours are spent: each kind of case of the first seed, as if it began with loose grains."""
+    for directory, _ in list(study.case_files())[:1 if study.settled else 2]:
+        stress = study.stress_list.rstrip(", ").split(",")[-1]
+        sets = ["--set", 'start=""'] + (["--set", f"normal_stress={stress}"] if directory.name == "shear" else [])
+        done = subprocess.run([study.moraine, "check", str(directory), *sets], cwd=home, capture_output=True, text=True)
+        if done.returncode:
+            raise MissingData(done.stderr.strip().removeprefix("moraine: "))
+
+
 def run(args):
     home = root / "cases" / args.NAME
     if not (home / "Snakefile").exists():
@@ -84,6 +94,9 @@ def run(args):
         raise MissingData("snakemake is not installed (Debian: apt-get install snakemake)")
     study = study_of(args)
     held = [] if args.dry_run else hold(home, study)
+    if not args.dry_run:
+        study.write_cases(home)
+        check(home, study)
     command = [snakemake, "--snakefile", "Snakefile", "--cores", str(args.cores), "--configfile", str(study.write_config(home)),
                # What has been computed stays valid when only words of the workflow change.
                "--rerun-triggers", "mtime", "--keep-going", "--rerun-incomplete",

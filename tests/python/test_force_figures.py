@@ -35,13 +35,6 @@ def test_right_and_up_are_x_and_z():
     assert image[int(y1), int(x1), 2] > image[int(y1), int(x1), 0]
 
 
-def test_ten_thousand_spheres_in_time():
-    from time import perf_counter
-    x, start = np.random.default_rng(1).random((10000, 3)), perf_counter()
-    spheres.render(x, np.full(10000, 0.02), np.tile(red, (10000, 1)), pixels=1500)
-    assert perf_counter() - start < 20
-
-
 @pytest.mark.filterwarnings("error")
 def test_each_figure_is_drawn(tmp_path):
     s = bed(tmp_path)

@@ -11,7 +11,7 @@ from fake_case import FakeCase
 from moraine import measure, report, reproduce
 from moraine.__main__ import main
 from moraine.case import Case, MissingData
-from moraine.paper2013 import Study, stress_names, toml
+from moraine.study import Study, stress_names, toml
 from moraine.reproduce import seeds
 
 
@@ -32,7 +32,7 @@ def test_a_study_and_its_cases():
 
 def test_a_variant_shares_the_settled_bed():
     study = Study(seeds=[1], settings={"wall.mass": "64 kg", "stage.shear.clear_history": "true"})
-    assert study.name == "fast+mass-64kg+shear.clear_history-true"
+    assert study.name == "fast+mass-64_kg+shear.clear_history-true"
     cases = {str(d): tomllib.loads(text) for d, text in study.case_files()}
     assert set(cases) == {"runs/fast/seed-1/settle", f"runs/{study.name}/seed-1/shear"}
     assert cases["runs/fast/seed-1/settle"].keys() == {"extends", "model", "grains"}
@@ -51,7 +51,7 @@ def test_a_variant_of_the_bed_settles_its_own():
 
 def test_the_same_word_twice_keeps_its_table():
     study = Study(settings={"contact.gamma_n": "200 N s/m", "wall.gamma_n": "0"})
-    assert study.name == "fast+contact.gamma_n-200Nsm+wall.gamma_n-0"
+    assert study.name == "fast+contact.gamma_n-200_N_s_m+wall.gamma_n-0"
 
 
 def test_values_are_toml():
@@ -88,7 +88,7 @@ def test_the_configuration_survives_being_written(tmp_path):
     import json
     study = Study(seeds=[1, 2], quick=True, settings={"wall.mass": "64 kg"})
     file = study.write_config(tmp_path)
-    assert Study.from_config(json.loads((tmp_path / file).read_text())).name == study.name == "quick+mass-64kg"
+    assert Study.from_config(json.loads((tmp_path / file).read_text())).name == study.name == "quick+mass-64_kg"
 
 
 @pytest.mark.skipif(not shutil.which("snakemake"), reason="snakemake is not installed")
@@ -104,6 +104,8 @@ def test_what_the_workflow_runs(tmp_path, monkeypatch):
     monkeypatch.delenv("MORAINE_LAUNCHER", raising=False)
     assert main(["reproduce", "paper-2013", "--seeds", "1", "--cores", "1"]) != 0  # the report finds no run
     assert calls.read_text().splitlines() == [
+        'check|runs/fast/seed-1/settle|--set|start=""|',
+        'check|runs/fast/seed-1/shear|--set|start=""|--set|normal_stress=120 kPa|',
         "run|runs/fast/seed-1/settle|--resume|--threads|1|--backend|cpu|",
         "sweep|runs/fast/seed-1/shear|--set|normal_stress=10,20,40,60,80,120 kPa|--resume|--threads|1|--backend|cpu|"]
 
@@ -167,7 +169,7 @@ def test_directions_have_a_sign():
     along, against = (measure.tilt(np.outer(v, v)) for v in ([1.0, 0, -1], [-1.0, 0, -1]))
     assert along == pytest.approx(45) and against == pytest.approx(-45)
     chains = {"above_4_sheared": 0.1, "above_4_consolidated": 0.1, "strong_tilt_consolidated": 3.0, "applied_tilt": 20.0, "stress_tilt": 40.0}
-    for tilt, verdict in ((40, "along the principal stress"), (20, "holds"), (-20, "does not hold")):
+    for tilt, verdict in ((40, "along the largest principal stress, not the paper's sum"), (20, "holds"), (-20, "does not hold")):
         lines = report.quantities([r | chains | {"strong_tilt_sheared": tilt} for r in rows()])
         assert find(lines, "the same in shear").verdict == verdict
 

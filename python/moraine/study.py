@@ -3,7 +3,7 @@
     runs/NAME/seed-S/settle                            grains settled at random
     runs/NAME/seed-S/shear/sweep/normal_stress-80kPa   consolidated and sheared
 
-NAME is the preset or quick, with what was set besides: fast+mass-64kg. Such a variant starts from the bed that fast has
+NAME is the preset or quick, with what was set besides: fast+mass-64_kg. Such a variant starts from the bed that fast has
 settled, unless what is set concerns that bed (grains, box, the stage settle).
 """
 from dataclasses import dataclass, field
@@ -25,11 +25,11 @@ def stress_names(text):
 
 
 def variant_names(settings):
-    """mass-64kg, shear.duration-2s: the last word of the key, with its stage, or its table where two keys have the same last word."""
+    """mass-64_kg, shear.duration-2_s: the last word of the key, with its stage, or its table where two keys have the same last word."""
     last = [key.rpartition(".")[2] for key in settings]
     def name(key, word):
         return key.removeprefix("stage.") if key.startswith("stage.") or last.count(word) > 1 else word
-    return [f"{name(key, word)}-{re.sub(r'[^A-Za-z0-9.-]+', '', value)}" for word, (key, value) in zip(last, settings.items())]
+    return [f"{name(key, word)}-{re.sub(r'[^A-Za-z0-9.-]+', '_', value)}" for word, (key, value) in zip(last, settings.items())]
 
 
 def concerns_bed(key):
@@ -74,6 +74,11 @@ class Study:
     def backend(self):
         return "--backend cuda" if self.gpu else "--backend cpu"
 
+    @property
+    def notes(self):
+        """What people have to say about the study of this name, for its report: notes-NAME.md beside the Snakefile."""
+        return f"--notes notes-{self.name}.md" if Path(f"notes-{self.name}.md").exists() else ""
+
     @classmethod
     def from_config(cls, config):
         """From Snakemake's configuration: any of the fields above, by their names."""
@@ -88,12 +93,12 @@ class Study:
         (home / file).write_text(json.dumps(self.__dict__, indent=1) + "\n")
         return file
 
-    def write_cases(self):
+    def write_cases(self, home="."):
         """The case.toml of each case, before anything runs. Those that are there stay; another one in its place is an error."""
         for directory, text in self.case_files():
-            file = directory / "case.toml"
+            file = Path(home) / directory / "case.toml"
             if not file.exists():
-                directory.mkdir(parents=True, exist_ok=True)
+                file.parent.mkdir(parents=True, exist_ok=True)
                 file.write_text(text)
             elif file.read_text() != text:
                 raise SystemExit(f"moraine: {file} is not that of this study; move the folder away, or remove it, and try again")
