@@ -75,7 +75,14 @@ def test_ends_where_the_stage_ends(tmp_path, last, expected):
     assert p.strain == pytest.approx(last["strain"] or 0.14)
 
 
-def test_estimates_the_time_left_from_rows_that_come(case):
+@pytest.fixture
+def still(monkeypatch):
+    """Time stands still, however busy the machine is."""
+    now = time.time()
+    monkeypatch.setattr(time, "time", lambda: now)
+
+
+def test_estimates_the_time_left_from_rows_that_come(case, still):
     history, p = case.history(), Progress(case.directory)
     for seconds_ago, rows in ((20, 60), (10, 70)):  # 0.01 s of model time each second
         case.write(history[:rows])
@@ -85,7 +92,7 @@ def test_estimates_the_time_left_from_rows_that_come(case):
     assert p.left() == (pytest.approx(left, rel=0.02), pytest.approx(left, rel=0.02))
 
 
-def test_later_stages_count_with_their_time_step(tmp_path):
+def test_later_stages_count_with_their_time_step(tmp_path, still):
     case = FakeCase(tmp_path / "case", [stage("a", "settle", duration=1.0, f=0.01), stage("b", "settle", duration=3.0, f=0.03)])
     history, p = case.history(), Progress(case.directory)
     for seconds_ago, rows in ((10, 1), (0, 51)):
@@ -124,7 +131,7 @@ def test_a_run_that_is_silent_for_long_is_noticed(case, capsys):
     assert f"./moraine run {case.directory} --resume".replace(" ", "") in "".join(out.split())
 
 
-def test_rows_that_come_slowly_are_no_silence(tmp_path, monkeypatch):
+def test_rows_that_come_slowly_are_no_silence(tmp_path, still, monkeypatch):
     case = FakeCase(tmp_path / "case", output={"series_interval": 0.01, "checkpoint_interval": 1e9})
     history, p = case.history(), Progress(case.directory)
     for seconds_ago, rows in ((160, 59), (130, 60), (100, 61)):  # a row each 30 s
