@@ -74,7 +74,7 @@ def mohr_coulomb(rows):
         axes.set_ylabel(f"{what} shear strength $\\tau_{what[0]}$ (kPa)")
         axes.set_xlim(0, end)
         axes.set_ylim(0)
-        axes.legend(loc="upper left", handlelength=2.6)
+        axes.legend(loc="upper left", handlelength=2.6, frameon=True, facecolor="white", edgecolor="none", framealpha=0.9, borderpad=0.2)
         panel(axes, letter)
     both[1].set_xlabel("normal stress $\\sigma_0$ (kPa)")
     figure.align_ylabels()
@@ -101,21 +101,23 @@ def displacement(cases):
     return figure
 
 
+def mean_porosity(snapshots):
+    """Porosity and middle heights (m) of slabs, means over several beds; without the slabs at floor and wall."""
+    profiles = [profile.porosity(s) for s in snapshots]
+    count = min(len(phi) for _, phi in profiles)
+    middle = np.mean([((edges[1:] + edges[:-1]) / 2)[:count] for edges, _ in profiles], axis=0)
+    return np.mean([phi[:count] for _, phi in profiles], axis=0)[1:-1], middle[1:-1]
+
+
 def porosity(cases):
     """Fig. 9: porosity of horizontal slabs, one mean grain diameter thick, at the end of shear."""
     figure, axes = plt.subplots(figsize=(column, 3.2))
     groups = by_stress(cases)
     for (sigma_0, own), look in zip(groups, lines(len(groups))):
-        profiles = [profile.porosity(c.stage("shear").snapshots[-1]) for c in own]
-        count = min(len(phi) for _, phi in profiles)
-        middle = np.mean([(edges[1:] + edges[:-1])[:count] / 2 for edges, _ in profiles], axis=0)
-        phi = np.mean([phi[:count] for _, phi in profiles], axis=0)
-        axes.plot(phi[1:-1], middle[1:-1], label=f"{sigma_0 / kPa:g} kPa", markevery=2, ms=2.6, mew=0.6, mfc="white", **look)
-    consolidated = [profile.porosity(c.stage("consolidate").snapshots[-1]) for c in groups[0][1]]
-    count = min(len(phi) for _, phi in consolidated)
-    axes.plot(np.mean([phi[:count] for _, phi in consolidated], axis=0)[1:-1],
-              ((consolidated[0][0][1:] + consolidated[0][0][:-1]) / 2)[:count][1:-1], color="0.7", lw=1,
-              label=f"before, {groups[0][0] / kPa:g} kPa")
+        axes.plot(*mean_porosity([c.stage("shear").snapshots[-1] for c in own]), label=f"{sigma_0 / kPa:g} kPa", markevery=2, ms=2.6,
+                  mew=0.6, mfc="white", **look)
+    sigma_0, own = groups[0]
+    axes.plot(*mean_porosity([c.stage("consolidate").snapshots[-1] for c in own]), color="0.7", lw=1, label=f"before, {sigma_0 / kPa:g} kPa")
     axes.set_xlabel("porosity of a slab one mean grain diameter thick")
     axes.set_ylabel("height above the floor (m)")
     axes.set_ylim(0)

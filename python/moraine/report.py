@@ -160,7 +160,8 @@ def force_lines(rows):
                f"{show(tilt, half, 1, '°')} from the vertical", "holds" if tilt < 15 else "does not hold")
     tilt, half = mean_interval(column(rows, "strong_tilt_sheared"))  # positive: dipping towards +x
     applied, stress = column(rows, "applied_tilt").mean(), column(rows, "stress_tilt").mean()
-    yield Line("the same in shear, towards the shear direction", "par. 31, Fig. 7", "along the maximum compressive stress σ' + τ; subhorizontal",
+    yield Line("the same in shear, towards the shear direction", "par. 31, Fig. 7",
+               "along the maximum compressive stress σ' + τ; subhorizontal",
                f"{show(tilt, half, 1, '°')} from the vertical; largest principal stress, from the contacts: {stress:.1f}°; σ' and τ "
                f"added as vectors, as the paper has it: {applied:.1f}°",
                "along the largest principal stress, not the paper's sum" if abs(tilt - stress) < 5 < abs(tilt - applied)
@@ -189,7 +190,8 @@ def rate_lines(rows):
         time, creep = column(rows, "collapse_time_s").mean(), column(rows, "creep_time_s").mean()
         r2, creep_r2 = column(rows, "collapse_r2").min(), column(rows, "creep_r2").min()
         yield Line("consolidation", "par. 29", "volumetric strain rate decays exponentially",
-                   f"collapse of the loose top with a time of {1e3 * time:.0f} ms (R² ≥ {r2:.3f}), then creep with {creep:.2f} s (R² ≥ {creep_r2:.3f})",
+                   f"collapse of the loose top with a time of {1e3 * time:.0f} ms (R² ≥ {r2:.3f}), then creep with {creep:.2f} s "
+                   f"(R² ≥ {creep_r2:.3f})",
                    "holds, in two steps" if min(r2, creep_r2) > 0.9 else "does not hold")
     if known(rows, "inertia_number"):
         numbers = dict(zip(column(rows, "sigma_0_kPa"), column(rows, "inertia_number")))
@@ -287,8 +289,9 @@ class Report:
                                  for row in [head, ["---"] * len(head), *rows]) + "\n")
 
     def figure(self, name, caption, directory):
-        svg = (directory / f"{name}.svg").read_bytes()
-        self.html.append(f'<figure><img alt="{escape(caption)}" src="data:image/svg+xml;base64,{base64.b64encode(svg).decode()}">'
+        kind, data = min((("svg+xml", (directory / f"{name}.svg").read_bytes()), ("png", (directory / f"{name}.png").read_bytes())),
+                         key=lambda x: len(x[1]) * (1 if x[0] == "png" else 0.5))  # vectors, unless they are far larger
+        self.html.append(f'<figure><img alt="{escape(caption)}" src="data:image/{kind};base64,{base64.b64encode(data).decode()}">'
                          f"<figcaption>{escape(caption)}</figcaption></figure>")
         self.md.append(f"![{name}](figures/{name}.png)\n\n*{caption}*\n")
 
