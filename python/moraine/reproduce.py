@@ -88,7 +88,7 @@ def check(home, study):
 def run(args):
     home = root / "cases" / args.NAME
     if not (home / "Snakefile").exists():
-        raise MissingData(f"there is no {home.relative_to(root)}/Snakefile; studies: {', '.join(studies())}")
+        raise MissingData(f"there is no {home}/Snakefile; studies: {', '.join(studies()) or 'none (they are in the repository)'}")
     snakemake = shutil.which("snakemake")
     if not snakemake:
         raise MissingData("snakemake is not installed (Debian: apt-get install snakemake)")
