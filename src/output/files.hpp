@@ -98,6 +98,19 @@ void write_checkpoint(const std::filesystem::path& path, const Checkpoint& check
 // later version.
 Checkpoint read_checkpoint(const std::filesystem::path& path);
 
+// Keeps other runs off a directory while this one writes there. The system lets go of it however a process
+// ends.
+class DirectoryLock {
+ public:
+  explicit DirectoryLock(const std::filesystem::path& directory);  // throws Error where another holds it
+  ~DirectoryLock();
+  DirectoryLock(const DirectoryLock&) = delete;
+  DirectoryLock& operator=(const DirectoryLock&) = delete;
+
+ private:
+  int file_;
+};
+
 // Writes text (or any bytes) aside, waits until the disk has it, and renames it. Throws Error (path, cause:
 // disk full, permission), and then leaves what stood there before.
 void write_text(const std::filesystem::path& path, std::string_view text);

@@ -52,6 +52,8 @@ class Runner {
     start_ = start_of(case_);  // with the engine, before anything of an earlier run is touched
     engine_ = dem::make_engine(options_.backend, options_.threads);
     warnings_ = precheck(case_, start_, *engine_);
+    make_directories(files_.output);
+    const output::DirectoryLock lock(files_.output);
     const bool resuming = settle_old_output();
     if (resuming && now_.finished) return {now_.rows, true};
     make_directories(files_.snapshots());

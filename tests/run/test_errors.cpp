@@ -125,6 +125,23 @@ TEST_F(Errors, OutputNotWritable) {
   expect_error(words, {"small/output", "cannot be created"});
 }
 
+TEST_F(Errors, TwoRunsOfOneCaseAtOnce) {
+  const fs::path c = make("c", small_case());
+  fs::create_directories(c / "output");
+  {
+    const output::DirectoryLock other(c / "output");
+    for (const char* how : {"--resume", "--force"}) {
+      std::vector<std::string> words = to_run(c);
+      words.push_back(how);
+      const Outcome o = moraine(words);
+      EXPECT_EQ(o.status, 1);
+      EXPECT_NE(o.err.find("output: another run is writing here"), std::string::npos) << o.err;
+      EXPECT_TRUE(fs::is_empty(c / "output"));
+    }
+  }
+  EXPECT_EQ(moraine(to_run(c, {"stages=[\"settle\"]", "stage.settle.duration=0.01"})).status, 0);
+}
+
 TEST_F(Errors, BlowUpNamesGrainAndStep) {
   const fs::path small = make("small", small_case());
   expect_error(to_run(small, {"model.f=30", "stage.settle.wall_gamma_n=0", "stage.settle.wall_gamma_t=0"}),

@@ -60,7 +60,7 @@ TEST(SweepPlan, CommasInQuotesAndBracketsAreNoLists) {
 }
 
 TEST(SweepPlan, ACommaMakesAListOfOne) {
-  const Plan plan = plan_sweep({{"normal_stress", "80 kPa,"}, {"wall.mass", "6 kg"}});
+  const auto plan = plan_sweep({{"normal_stress", "80 kPa,"}, {"wall.mass", "6 kg"}});
   EXPECT_EQ(names(plan), (std::vector<std::string>{"normal_stress-80kPa"}));
 }
 
