@@ -103,10 +103,8 @@ def displacement(cases):
 
 def mean_porosity(snapshots):
     """Porosity and middle heights (m) of slabs, means over several beds; without the slabs at floor and wall."""
-    profiles = [profile.porosity(s) for s in snapshots]
-    count = min(len(phi) for _, phi in profiles)
-    middle = np.mean([((edges[1:] + edges[:-1]) / 2)[:count] for edges, _ in profiles], axis=0)
-    return np.mean([phi[:count] for _, phi in profiles], axis=0)[1:-1], middle[1:-1]
+    edges, phi = (np.mean(values, axis=0) for values in zip(*profile.alike(snapshots)))
+    return phi[1:-1], ((edges[1:] + edges[:-1]) / 2)[1:-1]
 
 
 def porosity(cases):

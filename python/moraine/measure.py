@@ -86,10 +86,9 @@ def consolidation(case, shear, consolidate):
 def profiles(case, shear, consolidate):
     last = shear.snapshots[-1]
     depth, block = profile.shear_zone(last)
-    edges, phi = profile.porosity(last)
-    middle, inner = (edges[1:-2] + edges[2:-1]) / 2, phi[1:-1]  # the outermost slabs lie at the flat walls
-    return {"shear_zone_d": depth, "shear_zone_integral_d": block, "porosity_max": inner.max(),
-            "porosity_max_below_top_d": (last.top_wall - middle[inner.argmax()]) / case.diameter}
+    _, phi = profile.porosity(last)
+    return {"shear_zone_d": depth, "shear_zone_integral_d": block, "porosity_max": phi[1:-1].max(),  # the outermost lie at flat walls
+            "loosened_depth_d": profile.loosened_depth(consolidate.snapshots[-1], last)}
 
 
 def rotations(case, shear, consolidate):

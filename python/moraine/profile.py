@@ -67,3 +67,20 @@ def porosity(snapshot, thickness=None):
     h = np.clip(edges[:, None] - (z - r), 0, 2 * r)             # of the part of each sphere below each edge
     below = (np.pi * h**2 * (3 * r - h) / 3).sum(axis=1)
     return edges, 1 - np.diff(below) / (snapshot.area * np.diff(edges))
+
+
+def alike(snapshots):
+    """Edges (m) and porosity of as many slabs in each of several beds, about one mean grain diameter thick; [(edges, porosity)]."""
+    count = min(len(porosity(s)[1]) for s in snapshots)
+    return [porosity(s, s.top_wall / (count + 0.5)) for s in snapshots]
+
+
+def loosened_depth(before, after):
+    """Mean depth below the top wall, in mean grain diameters, of the porosity that slabs have gained from one snapshot to the other.
+    The slabs at floor and wall are left out."""
+    (_, phi_before), (edges, phi) = alike([before, after])
+    gain = np.clip(phi - phi_before, 0, None)[1:-1]
+    middle = ((edges[1:] + edges[:-1]) / 2)[1:-1]
+    if not gain.any():
+        return np.nan
+    return float((gain * (after.top_wall - middle)).sum() / gain.sum() / (2 * after.grains["radius"].mean()))

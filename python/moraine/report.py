@@ -144,8 +144,8 @@ def profile_lines(rows):
                    compare(value, paper.shear_zone_10kPa, further_run(column(low, "shear_zone_d")) + 0.5))
     yield order("shear zone (5 %, diameters) deepens with σ_0", "par. 33, Fig. 8", "order", rows, "shear_zone_d")
     yield order("highest porosity of a slab falls with σ_0", "par. 33, Fig. 9", "order", rows, "porosity_max", falling=True)
-    yield order("its depth below the top wall (diameters) grows with σ_0", "par. 33, Fig. 9", "nearest the top at low stress", rows,
-                "porosity_max_below_top_d")
+    yield order("mean depth of the porosity gained (diameters) grows with σ_0", "par. 33, Fig. 9", "nearest the top at low stress", rows,
+                "loosened_depth_d")
 
 
 def force_lines(rows):

@@ -108,6 +108,15 @@ def test_porosity_cuts_spheres_exactly():
     assert np.allclose(phi[2:], 1)
 
 
+def test_depth_of_the_porosity_gained():
+    r = 0.05
+    z = np.arange(0.05, 1, 0.1)                     # one grain in the middle of each of ten slabs
+    before = bed(z, r, box=(0.2, 0.2, 1))
+    after = bed(np.delete(z, [2, 6]), r, box=(0.2, 0.2, 1))
+    assert profile.loosened_depth(before, after) == pytest.approx((0.75 + 0.35) / 2 / 0.1)
+    assert np.isnan(profile.loosened_depth(before, before))
+
+
 def test_shear_zone_of_a_linear_profile():
     z = np.linspace(0.005, 0.995, 400)
     u = np.clip((z - 0.5) / 0.5, 0, None)          # the upper half shears
