@@ -321,6 +321,7 @@ def build(study, output, notes=None, say=print):
     if notes and not Path(notes).is_file():
         raise MissingData(f"there is no file {notes}")
     output.mkdir(parents=True, exist_ok=True)
+    made_by = version()  # before this report changes a file that the repository keeps
     left_out = []
 
     def note(why):
@@ -351,7 +352,7 @@ def build(study, output, notes=None, say=print):
                    f"seeds {', '.join(map(str, seeds))}, preset {first.get('preset')} (f = "
                    f"{first.get('f', np.nan):g}, k_n = {first.get('k_n', np.nan):.3g} N/m), sheared "
                    f"to a strain of {min(r['strain'] for r in rows):.2f}. {first.get('program', 'moraine').split(',')[0]}, {np.nansum(column(rows, 'hours')):.1f} hours of "
-                   f"runs, settling apart, several at once. This report: version {version()}, on {machine()}, {date.today()}.")
+                   f"runs, settling apart, several at once. This report: version {made_by}, on {machine()}, {date.today()}.")
     if unlike := differs(rows):
         text.paragraph(unlike)
     text.paragraph("± is half of a 95 % interval: of φ and C from the Levenberg-Marquardt fit over all runs, of all else from the scatter over "
