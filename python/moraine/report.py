@@ -37,9 +37,9 @@ def mean_interval(values):
 
 
 def further_run(values):
-    """Half width of the interval, about their mean, that one more run falls into; nan for a single value. The paper has one
+    """Half width of the interval, about their mean, that one more run falls into; nan for less than three values. The paper has one
     packing, whose values scatter as a single run's do here, however well the mean over many is known."""
-    return mean_interval(values)[1] * np.sqrt(len(values) + 1)
+    return mean_interval(values)[1] * np.sqrt(len(values) + 1) if len(values) > 2 else np.nan
 
 
 def show(value, half, digits=2, unit=""):
@@ -50,7 +50,7 @@ def show(value, half, digits=2, unit=""):
 def compare(value, reference, half):
     """half: half width of the 95 % interval of their difference."""
     if not np.isfinite(half):
-        return "no interval"
+        return "too few runs to tell"
     if abs(value - reference) <= half:
         return "agrees"
     return "higher" if value > reference else "lower"
@@ -182,7 +182,7 @@ def rotation_lines(rows):
         share, half = mean_interval(100 * column(rows, "opposite_spins"))
         yield Line("contacts whose grains spin against each other", "par. 44, Fig. 10", "grains prefer to roll in opposite directions",
                    f"{show(share, half, 1, ' %')} (50 % if they did not)",
-                   "no interval" if np.isnan(half) else "holds" if share - half > 50 else "does not hold")
+                   "too few runs to tell" if np.isnan(half) else "holds" if share - half > 50 else "does not hold")
 
 
 def rate_lines(rows):
