@@ -81,22 +81,32 @@ def mohr_coulomb(rows):
     return figure
 
 
+def against_height(axes, groups, curve, label, markevery):
+    """curve(snapshots) of the sheared beds of each normal stress, as values and heights (m); `label` names the values."""
+    for (sigma_0, own), look in zip(groups, lines(len(groups))):
+        values, height = curve([c.stage("shear").snapshots[-1] for c in own])
+        axes.plot(values, height, label=f"{sigma_0 / kPa:g} kPa", markevery=markevery, ms=2.6, mew=0.6, mfc="white", **look)
+    axes.set_xlabel(label)
+    axes.set_ylabel("height above the floor (m)")
+    axes.set_ylim(0)
+
+
+def mean_displacement(snapshots):
+    """Displacement along x (m) and heights (m), means over several beds."""
+    profiles = [profile.displacement(s) for s in snapshots]
+    height = np.linspace(max(z[0] for z, _ in profiles), min(z[-1] for z, _ in profiles), 60)
+    return np.mean([np.interp(height, z, u) for z, u in profiles], axis=0), height
+
+
 def displacement(cases):
     """Fig. 8: mean displacement along x against height at each normal stress, over the grains of the lowest stress."""
     figure, axes = plt.subplots(figsize=(column, 3.2))
     groups = by_stress(cases)
-    first = groups[0][1][0]
-    last = first.stage("shear").snapshots[-1]
-    axes.plot(last.grains["displacement"][:, 0], last.grains["position"][:, 2], ".", color="0.72", ms=1.4, mew=0, rasterized=True,
-              label=f"grains, {groups[0][0] / kPa:g} kPa")
-    for (sigma_0, own), look in zip(groups, lines(len(groups))):
-        profiles = [profile.displacement(c.stage("shear").snapshots[-1]) for c in own]
-        height = np.linspace(max(z[0] for z, _ in profiles), min(z[-1] for z, _ in profiles), 60)
-        mean = np.mean([np.interp(height, z, u) for z, u in profiles], axis=0)
-        axes.plot(mean, height, label=f"{sigma_0 / kPa:g} kPa", markevery=6, ms=2.6, mew=0.6, mfc="white", **look)
-    axes.set_xlabel("displacement along the shear direction (m)")
-    axes.set_ylabel("height above the floor (m)")
-    axes.set_ylim(0)
+    sigma_0, own = groups[0]
+    grains = own[0].stage("shear").snapshots[-1].grains
+    axes.plot(grains["displacement"][:, 0], grains["position"][:, 2], ".", color="0.72", ms=1.4, mew=0, rasterized=True,
+              label=f"grains, {sigma_0 / kPa:g} kPa")
+    against_height(axes, groups, mean_displacement, "displacement along the shear direction (m)", 6)
     axes.legend(title="$\\sigma_0$", loc="lower right")
     return figure
 
@@ -111,14 +121,9 @@ def porosity(cases):
     """Fig. 9: porosity of horizontal slabs, one mean grain diameter thick, at the end of shear."""
     figure, axes = plt.subplots(figsize=(column, 3.2))
     groups = by_stress(cases)
-    for (sigma_0, own), look in zip(groups, lines(len(groups))):
-        axes.plot(*mean_porosity([c.stage("shear").snapshots[-1] for c in own]), label=f"{sigma_0 / kPa:g} kPa", markevery=2, ms=2.6,
-                  mew=0.6, mfc="white", **look)
+    against_height(axes, groups, mean_porosity, "porosity of a slab one mean grain diameter thick", 2)
     sigma_0, own = groups[0]
     axes.plot(*mean_porosity([c.stage("consolidate").snapshots[-1] for c in own]), color="0.7", lw=1, label=f"before, {sigma_0 / kPa:g} kPa")
-    axes.set_xlabel("porosity of a slab one mean grain diameter thick")
-    axes.set_ylabel("height above the floor (m)")
-    axes.set_ylim(0)
     axes.legend(title="$\\sigma_0$", loc="lower right")
     return figure
 
