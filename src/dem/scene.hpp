@@ -47,11 +47,13 @@ struct Shear {
 struct Scene {
   Vec3d box{0, 0, 0};  // m; side lengths. z matters only where it is periodic.
   bool periodic_x = true, periodic_y = true, periodic_z = false;
-  bool floor = true;         // fixed wall at z = 0
-  double gravity = 9.80665;  // m/s2
-  double density = 2600;     // kg/m3, of the grains
-  double dt = 0;             // s
-  double time_0 = 0;         // s, since the stage began, at step_0: where this dt began
+  bool floor = true;                   // fixed wall at z = 0
+  double gravity = 9.80665;            // m/s2
+  double density = 2600;               // kg/m3, of the grains
+  double fluid_density = 0;            // kg/m3, of water that fills the pores; 0: dry
+  std::int64_t exchange_interval = 0;  // steps between exchanges with pore water (surroundings.hpp); 0: none
+  double dt = 0;                       // s
+  double time_0 = 0;                   // s, since the stage began, at step_0: where this dt began
   std::int64_t step_0 = 0;
   ContactParameters grain, wall;  // grain to grain, grain to wall
   TopWall top_wall;
@@ -59,7 +61,8 @@ struct Scene {
   double neighbour_margin = 0;  // m; 0: chosen from the grains. Never changes a result.
   bool ledger = true;           // account for every joule (state.hpp)
 
-  double area() const { return box.x * box.y; }  // m2
+  double area() const { return box.x * box.y; }                                         // m2
+  double submerged_gravity() const { return gravity * (1 - fluid_density / density); }  // m/s2, less buoyancy
 
   // s, since the stage began.
   MORAINE_HD double time(std::int64_t step) const { return time_0 + static_cast<double>(step - step_0) * dt; }
