@@ -23,6 +23,7 @@ struct Features {
   bool softening = false;  // mu_d < mu_s
   bool ledger = true;      // dissipated energy
   bool damped = viscous;   // gamma_n or gamma_t between grains or at walls
+  bool water = false;      // pore water pushes the grains
 };
 
 // Where two bodies stand to one another.

@@ -30,32 +30,37 @@ struct Drive {
   double layer_u = 0, layer_mass = 0;
   double layer_u_now = 0, layer_u_ahead = 0;  // m/s, as the wall's
   Reaction at, before;                        // at the present step and one earlier
+  WaterReaction water, water_before;          // likewise; zero where the bed is dry
   double sigma = 0, sigma_before = 0;         // Pa, asked of the wall
   Ledger ledger;
   std::int64_t step = 0;
 
   // Takes the forces of the present step and closes the account of the step that led to it. Work is counted
   // with the mean of the forces before and after, as leapfrog does it.
-  MORAINE_HD void close(const Scene& s, const Reaction& reaction) {
-    take(s, reaction);
+  MORAINE_HD void close(const Scene& s, const Reaction& reaction, const WaterReaction& by_water) {
+    take(s, reaction, by_water);
     const double area = s.box.x * s.box.y;
     if (s.top_wall.drive == TopWall::Drive::stress)
       ledger.top_wall -= 0.5 * (sigma_before + sigma) * area * wall_dz;
     if (s.top_wall.drive == TopWall::Drive::velocity)
-      ledger.top_wall -= 0.5 * (before.wall_force + at.wall_force) * wall_dz;
+      ledger.top_wall -=
+          0.5 * ((before.wall_force + at.wall_force) + (water_before.wall + water.wall)) * wall_dz;
     if (s.shear.drive == Shear::Drive::velocity)
-      ledger.layers -= 0.5 * (before.shear_force + at.shear_force) * layer_u * s.dt;
+      ledger.layers -=
+          0.5 * ((before.shear_force + at.shear_force) + (water_before.layer + water.layer)) * layer_u * s.dt;
     if (s.shear.drive == Shear::Drive::stress) ledger.layers += s.shear.stress * area * layer_u * s.dt;
     const double power = viscous_power();
     ledger.viscous += 0.5 * (ledger.viscous_power + power) * s.dt;
     ledger.viscous_power = power;
+    ledger.water += by_water.work;
   }
   // W, that viscous contacts take.
   MORAINE_HD double viscous_power() const {
     return -at.damping_power - at.wall_damping * wall_v_now - at.layer_damping * (layer_u_now - layer_u);
   }
-  MORAINE_HD void take(const Scene& s, const Reaction& reaction) {
+  MORAINE_HD void take(const Scene& s, const Reaction& reaction, const WaterReaction& by_water) {
     at = reaction;
+    water = by_water;
     sigma = s.normal_stress(s.time(step));
     wall_v_now = fma(wall_acceleration(s), 0.5 * s.dt, wall_v);
     layer_u_now = fma(layer_acceleration(s), 0.5 * s.dt, layer_u);
@@ -64,6 +69,7 @@ struct Drive {
   // Wall and layer from step n to n + 1 (velocities from n - 1/2 to n + 1/2).
   MORAINE_HD void advance(const Scene& s) {
     before = at;
+    water_before = water;
     sigma_before = sigma;
     const double acceleration = wall_acceleration(s);
     wall_v = fma(acceleration, s.dt, wall_v);
@@ -82,11 +88,11 @@ struct Drive {
 
   MORAINE_HD double wall_acceleration(const Scene& s) const {
     if (s.top_wall.drive != TopWall::Drive::stress) return 0;
-    return (at.wall_force - sigma * (s.box.x * s.box.y)) / s.top_wall.mass;
+    return (at.wall_force + water.wall - sigma * (s.box.x * s.box.y)) / s.top_wall.mass;
   }
   MORAINE_HD double layer_acceleration(const Scene& s) const {
     if (s.shear.drive != Shear::Drive::stress) return 0;
-    return (s.shear.stress * (s.box.x * s.box.y) + at.shear_force) / layer_mass;
+    return (s.shear.stress * (s.box.x * s.box.y) + at.shear_force + water.layer) / layer_mass;
   }
 };
 

@@ -60,7 +60,7 @@ Drive drive_of(const Scene& scene, const State& s) {
     if (s.role[i] == Role::top) d.layer_mass += sphere_mass(scene.density, s.r[i]);
   d.step = s.step;
   d.ledger = s.ledger;
-  d.take(scene, {s.wall_force, s.shear_force, 0});
+  d.take(scene, {s.wall_force, s.shear_force, 0}, s.water);
   d.wall_v_ahead = s.staggered ? d.wall_v_now : d.wall_v;
   return d;
 }
@@ -77,6 +77,11 @@ Error lost_grain(const Scene& scene, const Drive& drive, const GrainRow& g, Inde
     return error(place.str(), "not a finite number", remedy);
   if (scene.floor && g.x.z < -g.r) return error(place.str(), "fell through the floor", remedy);
   return error(place.str(), "passed through the top wall (at ", drive.wall_z, " m)", remedy);
+}
+
+Vec3d kick(const Scene& scene, const State& s, Index i) {
+  if (s.water_force.empty() || !exchanges(scene, s.step)) return s.force[i];
+  return axpy(static_cast<double>(scene.exchange_interval), s.water_force[i], s.force[i]);
 }
 
 void half_step_back(const Scene& scene, GrainRow& g, const LoadRow& load) {
@@ -120,6 +125,7 @@ void finish_state(State& s, const Drive& d) {
   });
   s.wall_z = d.wall_z, s.wall_v = d.wall_v, s.layer_u = d.layer_u;
   s.wall_force = d.at.wall_force, s.shear_force = d.at.shear_force;
+  s.water = d.water;
   s.ledger = d.ledger;
   s.step = d.step;
   s.staggered = true;
@@ -129,7 +135,7 @@ void synchronise(const Scene& scene, State& s) {
   if (!s.staggered) return;
   for (Index i = 0; i < s.size(); ++i) {
     const Mobility m = mobility(scene, s.r[i], s.role[i]);
-    s.v[i] = axpy(0.5 * scene.dt, m.acceleration(s.force[i]), s.v[i]);
+    s.v[i] = axpy(0.5 * scene.dt, m.acceleration(kick(scene, s, i)), s.v[i]);
     s.omega[i] = axpy(0.5 * scene.dt, m.spin_acceleration(s.torque[i]), s.omega[i]);
   }
   Drive d = drive_of(scene, s);
@@ -146,7 +152,7 @@ void change_step(Scene& scene, State& s, double dt) {
   if (!staggered) return;
   for (Index i = 0; i < s.size(); ++i) {
     const Mobility m = mobility(scene, s.r[i], s.role[i]);
-    s.v[i] = axpy(-0.5 * dt, m.acceleration(s.force[i]), s.v[i]);
+    s.v[i] = axpy(-0.5 * dt, m.acceleration(kick(scene, s, i)), s.v[i]);
     s.omega[i] = axpy(-0.5 * dt, m.spin_acceleration(s.torque[i]), s.omega[i]);
   }
   Drive d = drive_of(scene, s);

@@ -61,6 +61,13 @@ MORAINE_HD bool is_lost(const Scene& scene, const Drive& drive, const GrainRow& 
 }
 Error lost_grain(const Scene& scene, const Drive& drive, const GrainRow& g, Index id);
 
+// Whether grains and pore water meet at this step.
+MORAINE_HD bool exchanges(const Scene& scene, std::int64_t step) {
+  return scene.exchange_interval > 0 && step % scene.exchange_interval == 0;
+}
+// N, the whole force that the leapfrog applies to a grain at the state's step, without gravity.
+Vec3d kick(const Scene& scene, const State& s, Index i);
+
 void half_step_back(const Scene& scene, GrainRow& grain, const LoadRow& load);
 
 void append_grain(State& s, const GrainRow& grain, const LoadRow& load, Role role);

@@ -13,27 +13,34 @@ inline Features features_of(const Scene& s) {
   f.viscous = viscous(s.grain), f.damped = any(viscous);
   f.softening = f.friction && any([](const ContactParameters& p) { return p.mu_d < p.mu_s; });
   f.ledger = s.ledger;
+  f.water = s.exchange_interval > 0;
   return f;
 }
 
 // What of it the grains' contacts with one another and those with walls need.
 constexpr Features between_grains(Features f) {
-  f.damped = f.viscous;
+  f.damped = f.viscous, f.water = false;
   return f;
 }
 constexpr Features at_walls(Features f) {
-  f.viscous = f.damped;
+  f.viscous = f.damped, f.water = false;
   return f;
 }
 
 // Calls use.operator()<F>() with the compiled set of features that equals f.
 template <class Use>
 void with_features(const Features& f, Use&& use) {
+  const auto water = [&]<bool friction, bool viscous, bool damped, bool softening, bool ledger>() {
+    if (f.water)
+      use.template operator()<Features{friction, viscous, softening, ledger, damped, true}>();
+    else
+      use.template operator()<Features{friction, viscous, softening, ledger, damped, false}>();
+  };
   const auto ledger = [&]<bool friction, bool viscous, bool damped, bool softening>() {
     if (f.ledger)
-      use.template operator()<Features{friction, viscous, softening, true, damped}>();
+      water.template operator()<friction, viscous, damped, softening, true>();
     else
-      use.template operator()<Features{friction, viscous, softening, false, damped}>();
+      water.template operator()<friction, viscous, damped, softening, false>();
   };
   const auto viscous = [&]<bool friction, bool softening>() {
     if (f.viscous)

@@ -51,12 +51,15 @@ class GatherEngine final : public Engine {
  public:
   GatherEngine(Space space, std::string name) : space_(std::move(space)), name_(std::move(name)) {}
 
-  void load(const Scene& scene, const State& s) override {
+  void load(const Scene& scene, const State& s, Surroundings* surroundings) override {
     check_scene(scene, s);
     n_ = s.size();
     id_ = s.id, x_start_ = s.x_start, role_host_ = s.role;
     r_max_ = *std::max_element(s.r.begin(), s.r.end());
     features_ = features_of(scene);
+    surroundings_ = features_.water ? surroundings : nullptr;
+    features_.water = false;  // a pointer tells (GatherView::water)
+    water_.set(std::vector<WaterRow>(surroundings_ ? n_ : 0));
     view_ = {};
     view_.scene = scene, view_.sides = Sides::of(scene);
     view_.n = n_, view_.chunk = chunk_size(n_), view_.margin = neighbour_margin(scene, s);
@@ -78,7 +81,13 @@ class GatherEngine final : public Engine {
     lost_.resize(view_.chunks());
     Control control;
     control.drive = drive_of(scene, s);
+    control.water = s.water;
     control_.set({control});
+    if (surroundings_ && s.staggered) {
+      std::vector<WaterRow> rows(n_);
+      for (Index i = 0; i < n_; ++i) rows[i] = {s.water_force[i], 0};
+      water_.set(rows);
+    }
 
     search(s.step);
     place_springs(s.contacts);
@@ -92,6 +101,7 @@ class GatherEngine final : public Engine {
       now_[s.step & 1].set(now);
     }
     evaluate(control);
+    if (surroundings_) exchange(/*first=*/true);
     start_half_a_step_back();
   }
 
@@ -100,9 +110,15 @@ class GatherEngine final : public Engine {
     const std::int64_t end = control.drive.step + steps;
     while (control.drive.step < end || control.stale) {
       // Not all at once, for engines that share a card and do not fit side by side.
-      march(view_, std::min(end, control.drive.step + 4096));
+      std::int64_t target = std::min(end, control.drive.step + 4096);
+      const std::int64_t m = view_.scene.exchange_interval;
+      if (surroundings_) target = std::min(target, (control.drive.step / m + (control.stale ? 0 : 1)) * m);
+      march(view_, std::max(target, control.drive.step));
       control = space_.read(control_.data());
-      if (!control.stale) continue;
+      if (!control.stale) {
+        if (surroundings_ && exchanges(view_.scene, control.drive.step)) exchange();
+        continue;
+      }
       check_lost(control);
       search_again(control.drive.step);
       control.moved = 0;
@@ -116,9 +132,11 @@ class GatherEngine final : public Engine {
     Control control = space_.read(control_.data());
     const std::vector<GrainRow> grains = grain_[control.drive.step & 1].get();
     const std::vector<LoadRow> loads = load_.get();
+    if (surroundings_)
+      for (const WaterRow& w : water_.get()) s.water_force.push_back(w.f);
     if (!control.closed) {
       const Note total = sums(control.drive.step);
-      control.drive.close(view_.scene, total.reaction);
+      control.drive.close(view_.scene, total.reaction, control.water_at(view_.scene));
       control.drive.ledger.slip += total.slip;
     }
     for (Index i = 0; i < n_; ++i) append_grain(s, grains[i], loads[i], role_host_[i]);
@@ -152,6 +170,7 @@ class GatherEngine final : public Engine {
       view_.grain[parity] = grain_[parity].data(), view_.now[parity] = now_[parity].data();
       view_.tally[parity] = tally_[parity].data(), view_.chunk_tally[parity] = chunk_tally_[parity].data();
     }
+    view_.water = surroundings_ ? water_.data() : nullptr;
     view_.load = load_.data(), view_.role = role_.data(), view_.control = control_.data();
     view_.row = lists_.row.data(), view_.neighbour = lists_.neighbour.data();
     view_.spring = spring_.data(), view_.wall_spring = wall_spring_.data();
@@ -200,6 +219,19 @@ class GatherEngine final : public Engine {
     march(still, control.drive.step);
   }
 
+  // Grains and water meet on the host, where the grid is solved for.
+  void exchange(bool first = false) {
+    Control control = space_.read(control_.data());
+    const std::vector<GrainRow> grains = grain_[control.drive.step & 1].get();
+    if (first || surroundings_->stale()) surroundings_->remap(grains.data(), control.drive);
+    for (Index c = 0; c < view_.chunks(); ++c) surroundings_->displace(c, grains.data());
+    control.water = surroundings_->solve(control.drive, view_.scene.time(control.drive.step));
+    std::vector<WaterRow> water(n_);
+    for (Index c = 0; c < view_.chunks(); ++c) surroundings_->push(c, water.data());
+    water_.set(water), control_.set({control});
+    refresh_view();
+  }
+
   Note sums(std::int64_t step) const {
     const std::vector<Note> tally = tally_[step & 1].get();
     Note total;
@@ -216,16 +248,20 @@ class GatherEngine final : public Engine {
     Control control = space_.read(control_.data());
     const Reaction reaction = sums(control.drive.step).reaction;
     Drive& drive = control.drive;
-    drive.take(view_.scene, reaction);
+    drive.take(view_.scene, reaction, control.water);
     drive.half_step(view_.scene, -1);
-    drive.take(view_.scene, reaction);  // now that the wall's velocity is that of n - 1/2
+    drive.take(view_.scene, reaction, control.water);  // now that the wall's velocity is that of n - 1/2
     drive.ledger = {};
     drive.ledger.viscous_power = drive.viscous_power();
     Array<GrainRow>& rows = grain_[drive.step & 1];
     std::vector<GrainRow> grains = rows.get();
     std::vector<LoadRow> loads = load_.get();
+    const std::vector<WaterRow> water = water_.get();
     for (Index i = 0; i < n_; ++i) {
-      half_step_back(view_.scene, grains[i], loads[i]);
+      LoadRow whole = loads[i];
+      if (surroundings_)
+        whole.f = axpy(static_cast<double>(view_.scene.exchange_interval), water[i].f, whole.f);
+      half_step_back(view_.scene, grains[i], whole);
       loads[i].slip = 0;
     }
     rows.set(grains), load_.set(loads), control_.set({control});
@@ -247,11 +283,13 @@ class GatherEngine final : public Engine {
   Index n_ = 0;
   double r_max_ = 0;
   Features features_;
+  Surroundings* surroundings_ = nullptr;
   GatherView view_;
   Neighbours<Space> lists_, old_lists_;
   Array<GrainRow> grain_[2];
   Array<NowRow> now_[2];
   Array<LoadRow> load_;
+  Array<WaterRow> water_;
   Array<Role> role_;
   Array<Spring<double>> spring_, old_spring_, wall_spring_;
   Array<Note> tally_[2], chunk_tally_[2];

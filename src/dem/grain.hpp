@@ -42,6 +42,12 @@ struct alignas(64) LoadRow {
   }
 };
 
+// What pore water does to a grain, N.
+struct alignas(32) WaterRow {
+  Vec3d f;
+  double unused;
+};
+
 // Grains are dealt into chunks of neighbours in memory order: the unit of work of a thread and of every sum.
 // Their number depends on the number of grains alone, so results do not depend on the number of threads.
 inline Index chunk_size(Index grains) {

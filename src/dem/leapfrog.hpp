@@ -29,13 +29,14 @@ struct Mobility {
 
 MORAINE_HD Mobility mobility(const Scene& scene, double r, Role role) {
   const double m = sphere_mass(scene.density, r);
-  if (role == Role::free) return {1 / m, 1 / m, -scene.gravity, 1 / (0.4 * m * r * r)};
+  if (role == Role::free) return {1 / m, 1 / m, -scene.submerged_gravity(), 1 / (0.4 * m * r * r)};
   return {0, scene.shear.hold_z ? 0 : 1 / m, 0, 0};
 }
 // The same from a grain's row, which says by its inverse_inertia whether the grain is free.
 MORAINE_HD Mobility mobility(const Scene& scene, const GrainRow& g) {
   const bool free = g.inverse_inertia > 0;
-  return {free ? g.inverse_mass : 0, g.inverse_mass, free ? -scene.gravity : 0, g.inverse_inertia};
+  return {free ? g.inverse_mass : 0, g.inverse_mass, free ? -scene.submerged_gravity() : 0,
+          g.inverse_inertia};
 }
 
 template <class Row>

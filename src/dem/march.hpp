@@ -16,9 +16,15 @@ namespace moraine::dem {
 // What all blocks agree on.
 struct Control {
   Drive drive;
-  double moved = 0;    // m, bound on the approach of any two bodies since the last search
-  bool stale = false;  // the lists have run out, or a grain is lost: grains are at this step, forces are not
-  bool closed = true;  // the account of the present step is in drive.ledger already
+  double moved = 0;     // m, bound on the approach of any two bodies since the last search
+  bool stale = false;   // the lists have run out, or a grain is lost: grains are at this step, forces are not
+  bool closed = true;   // the account of the present step is in drive.ledger already
+  WaterReaction water;  // of the last exchange
+
+  MORAINE_HD WaterReaction water_at(const Scene& scene) const {
+    if (exchanges(scene, drive.step)) return water;
+    return {water.wall_between, 0, 0, water.wall_between};
+  }
 };
 
 // What a grain, a group of them, a chunk or all add to a step's sums.
@@ -63,7 +69,8 @@ struct GatherView {
   double margin;
   GrainRow* grain[2];
   NowRow* now[2];
-  LoadRow* load;  // of the last step of a launch; with a layer driven by stress, of each
+  LoadRow* load;          // of the last step of a launch; with a layer driven by stress, of each
+  const WaterRow* water;  // of the last exchange; null without pore water
   const Role* role;
   const std::int64_t* row;
   const Index* neighbour;
@@ -142,7 +149,7 @@ struct March {
 
   MORAINE_HD void close_and_advance(Control& c, const Note& total) const {
     if (!c.closed) {
-      c.drive.close(w.scene, total.reaction);
+      c.drive.close(w.scene, total.reaction, c.water_at(w.scene));
       c.drive.ledger.slip += total.slip;
     }
     c.closed = false;
@@ -243,7 +250,8 @@ struct March {
         if constexpr (F.damped && F.ledger) note.reaction.layer_damping = damping.f.x;
       }
       if constexpr (F.damped && F.ledger)
-        note.reaction.damping_power = damping_power(w.scene, w.grain[step & 1][i], load, damping, w.scene.dt);
+        note.reaction.damping_power =
+            damping_power(w.scene, w.grain[step & 1][i], with_water(load, i, step), damping, w.scene.dt);
       if (!move) w.load[i] = load;
     } else {
       if (item.lane != 0) return note;
@@ -317,6 +325,12 @@ struct March {
     }
   }
 
+  MORAINE_HD LoadRow with_water(LoadRow load, Index i, std::int64_t step) const {
+    if (w.water && exchanges(w.scene, step))
+      load.f = axpy(static_cast<double>(w.scene.exchange_interval), w.water[i].f, load.f);
+    return load;
+  }
+
   // To step + 1; returns its speed as Note has it.
   MORAINE_HD float move_on(const Drive& drive, std::int64_t step, Index i, const LoadRow& load) const {
     GrainRow g = w.grain[step & 1][i];
@@ -324,7 +338,8 @@ struct March {
     if (layer) g.v.x = drive.layer_u;
     const Triple dt(Vec3d{w.scene.dt, w.scene.dt, w.scene.dt});
     const Mobility m = mobility(w.scene, g);
-    const Triple acceleration = m.acceleration(load.f), spin_acceleration = m.spin_acceleration(load.torque);
+    const Triple acceleration = m.acceleration(with_water(load, i, step).f),
+                 spin_acceleration = m.spin_acceleration(load.torque);
     Kinematics<Triple> k{g.x, g.v, g.omega, g.rotation};
     leapfrog(k, acceleration, spin_acceleration, dt);
     g.x = k.x, g.v = k.v, g.omega = k.omega, g.rotation = k.rotation;

@@ -24,7 +24,7 @@ Velocities at_step(const Scene& scene, const State& s) {
   if (!s.staggered) return w;
   for (Index i = 0; i < s.size(); ++i) {
     const Mobility m = mobility(scene, s.r[i], s.role[i]);
-    w.v[i] = axpy(0.5 * scene.dt, m.acceleration(s.force[i]), s.v[i]);
+    w.v[i] = axpy(0.5 * scene.dt, m.acceleration(kick(scene, s, i)), s.v[i]);
     w.omega[i] = axpy(0.5 * scene.dt, m.spin_acceleration(s.torque[i]), s.omega[i]);
   }
   if (scene.shear.drive == Shear::Drive::stress) {
@@ -100,7 +100,10 @@ Observation observe(const Scene& scene, const State& s) {
   double floor_force = 0;
   for (const WallForce& w : walls)
     if (w.wall == WallName::floor) floor_force += w.f.z;
-  o.shear_stress = -s.shear_force / area;
+  double water_on_layer = 0;
+  for (Index i = 0; i < static_cast<Index>(s.water_force.size()); ++i)
+    if (s.role[i] == Role::top) water_on_layer += s.water_force[i].x;
+  o.shear_stress = -(s.shear_force + water_on_layer) / area;
   o.normal_stress = (has_wall ? s.wall_force : floor_force) / area;
 
   double volume = 0;
@@ -142,8 +145,8 @@ Observation observe(const Scene& scene, const State& s) {
     e.kinetic += 0.5 * m * before_times_after(s.v[i], at.v[i]);
     e.rotational += 0.5 * inertia * before_times_after(s.omega[i], at.omega[i]);
     if (s.role[i] != Role::free) continue;
-    e.potential += m * scene.gravity * s.x[i].z;
-    const Vec3d a = mob.acceleration(s.force[i]);
+    e.potential += m * scene.submerged_gravity() * s.x[i].z;
+    const Vec3d a = mob.acceleration(s.water_force.empty() ? s.force[i] : s.force[i] + s.water_force[i]);
     net += m * std::sqrt(dot(a, a));
     ++free;
   }

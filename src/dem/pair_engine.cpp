@@ -101,7 +101,7 @@ Engine::Counts PairEngine::counts() const {
   return c;
 }
 
-void PairEngine::load(const Scene& scene, const State& s) {
+void PairEngine::load(const Scene& scene, const State& s, Surroundings* surroundings) {
   check_scene(scene, s);
   scene_ = scene;
   sides_ = Sides::of(scene);
@@ -124,6 +124,12 @@ void PairEngine::load(const Scene& scene, const State& s) {
   now_.resize(features.damped ? n_ + 1 : 0);
   damping_.resize(features.damped && features.ledger ? n_ : 0);
   clear(damping_);
+  surroundings_ = features.water ? surroundings : nullptr;
+  water_.resize(features.water ? n_ : 0);
+  for (Index i = 0; i < static_cast<Index>(water_.size()); ++i)
+    water_.data()[i] = {s.staggered ? s.water_force[i] : Vec3d{0, 0, 0}, 0};
+  water_reaction_ = s.water;
+  solved_ = -1;
   buffers_.clear();
   buffers_.resize(space_.threads);
 
@@ -165,15 +171,36 @@ void PairEngine::load(const Scene& scene, const State& s) {
   (this->*evaluate_)(0.0);
   Drive& drive = course_.drive;
   const Reaction reaction = sum_reactions(drive.step);
-  drive.take(scene, reaction);
+  if (features.water) exchange_alone();
+  drive.take(scene, reaction, water_at(drive.step));
   drive.half_step(scene, -1);
-  drive.take(scene, reaction);  // now that the wall's velocity is that of n - 1/2
+  drive.take(scene, reaction, drive.water);  // now that the wall's velocity is that of n - 1/2
   drive.ledger = {};
   drive.ledger.viscous_power = drive.viscous_power();
   for (Index i = 0; i < n_; ++i) {
-    half_step_back(scene, grain_.data()[i], load_.data()[i]);
+    half_step_back(scene, grain_.data()[i], with_water(load_.data()[i], i, drive.step));
     load_.data()[i].slip = 0;
   }
+}
+
+// With the grains at rest in between: what the pressures of the start do.
+void PairEngine::exchange_alone() {
+  surroundings_->remap(grain_.data(), course_.drive);
+  const auto chunks = static_cast<Index>(chunks_.size());
+  for (Index c = 0; c < chunks; ++c) surroundings_->displace(c, grain_.data());
+  water_reaction_ = surroundings_->solve(course_.drive, scene_.time(course_.drive.step));
+  for (Index c = 0; c < chunks; ++c) surroundings_->push(c, water_.data());
+}
+
+LoadRow PairEngine::with_water(LoadRow load, Index i, std::int64_t step) const {
+  if (kicked_at(step))
+    load.f = axpy(static_cast<double>(scene_.exchange_interval), water_.data()[i].f, load.f);
+  return load;
+}
+
+WaterReaction PairEngine::water_at(std::int64_t step) const {
+  if (kicked_at(step) || !surroundings_) return water_reaction_;
+  return {water_reaction_.wall_between, 0, 0, water_reaction_.wall_between};
 }
 
 // As near pairs, from which find_candidates takes their springs.
@@ -514,7 +541,9 @@ void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt, LoadRow* lo
   if constexpr (F.damped && F.ledger)
     for (Index i = chunk.begin; i < chunk.end; ++i) {
       LoadRow& damping = damping_.data()[i];
-      power.add(i, damping_power(scene_, grain_.data()[i], load[i], damping, dt));
+      // Of the last exchange: the present one may not have been solved yet.
+      const LoadRow whole = F.water ? with_water(load[i], i, drive.step) : load[i];
+      power.add(i, damping_power(scene_, grain_.data()[i], whole, damping, dt));
       damping = {};
     }
   chunk.at(drive.step).reaction = {wall_force.total(), shear_force.total(), wall_damping.total(),
@@ -527,8 +556,9 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive, std::int64_t step, 
   if (scene_.shear.drive == Shear::Drive::stress)
     for (const Index i : chunk.top_layer) grain[i].v.x = drive.layer_u;
   const Row zero(0.0), dt(scene_.dt, scene_.dt, scene_.dt, 0);
-  const Row all_three(1, 1, 1, 0), only_z(0, 0, 1, 0), gravity(0, 0, -scene_.gravity, 0);
+  const Row all_three(1, 1, 1, 0), only_z(0, 0, 1, 0), gravity(0, 0, -scene_.submerged_gravity(), 0);
   [[maybe_unused]] const Row half_dt = Row(0.5) * dt;
+  [[maybe_unused]] const Row impulse(kicked_at(step) ? static_cast<double>(scene_.exchange_interval) : 0.0);
   Row sum_f = zero, group_f = zero, fastest2 = zero;
   for (Index i = chunk.begin; i < chunk.end; ++i) {
     // Other threads have read these rows; asking for several at once to write to saves most of the waiting.
@@ -537,7 +567,9 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive, std::int64_t step, 
     const bool free = g.inverse_inertia > 0;  // as in mobility()
     const Row inverse_mass = Row(g.inverse_mass) * (free ? all_three : only_z);
     const Row f = row(loads[i].f), torque = row(loads[i].torque);
-    const Row acceleration = fma(f, inverse_mass, free ? gravity : zero);
+    Row force = f;
+    if constexpr (F.water) force = fma(impulse, row(water_.data()[i].f), f);
+    const Row acceleration = fma(force, inverse_mass, free ? gravity : zero);
     const Row spin_acceleration = torque * Row(g.inverse_inertia);
     Kinematics<Row> k{row(g.x), row(g.v), row(g.omega), row(g.rotation)};
     leapfrog(k, acceleration, spin_acceleration, dt);
@@ -613,8 +645,22 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
                          [&](Index l) { return static_cast<std::size_t>(links_[l].to) >= end; });
     });
     const auto close_and_advance = [&] {
-      if (!closed) drive.close(scene_, sum_reactions(drive.step));
+      if (!closed) drive.close(scene_, sum_reactions(drive.step), water_at(drive.step));
       drive.advance(scene_);
+    };
+    // The thread that is last to say where its grains went solves for the pressure while others go on to
+    // their pairs.
+    [[maybe_unused]] const auto exchange = [&] {
+      if (surroundings_->stale()) {
+        if (thread == 0) surroundings_->remap(grain_.data(), drive);
+        barrier.wait();
+      }
+      for (const Chunk* c : mine)
+        surroundings_->displace(static_cast<Index>(c - chunks_.data()), grain_.data());
+      if (displaced_.fetch_add(1, std::memory_order_acq_rel) + 1 < space_.threads) return;
+      displaced_.store(0, std::memory_order_relaxed);
+      water_reaction_ = surroundings_->solve(drive, scene_.time(drive.step));
+      solved_.store(drive.step, std::memory_order_release);
     };
 
     while (left > 0) {
@@ -657,9 +703,19 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
       forces_next = false;
       --left;
       integrated = left > 0 && !layer_by_stress;
+      [[maybe_unused]] const bool exchanging = F.water && kicked_at(drive.step);
+      if constexpr (F.water)
+        if (exchanging) exchange();
+      const auto is_ready = [&](const Chunk& c) {
+        if constexpr (F.water)
+          if (exchanging && solved_.load(std::memory_order_acquire) != drive.step) return false;
+        return others_are_done(c, drive.step);
+      };
       // Loads that are asked for after this step go to their own place, all others to a buffer.
       const auto complete = [&](Waiting w) {
         finish<F>(*w.chunk, drive, dt, w.load);
+        if constexpr (F.water)
+          if (exchanging) surroundings_->push(static_cast<Index>(w.chunk - chunks_.data()), water_.data());
         if (!integrated) return;
         integrate<F>(*w.chunk, drive, drive.step, w.load);
         buffers.give_back(w.load + w.chunk->begin);
@@ -671,7 +727,7 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
         const Waiting w{&c, integrated ? buffers.take(chunk_size_) - c.begin : load_.data()};
         pair_forces<F>(c, dt, w.load);
         progress.done.store(drive.step, std::memory_order_release);
-        if (others_are_done(c, drive.step))
+        if (is_ready(c))
           complete(w);
         else
           waiting.push_back(w);
@@ -679,9 +735,8 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
       for (Chunk* c : mine) take_on(*c);
       std::size_t all_taken_from = chunks_.size();
       for (Patience patience;;) {
-        const auto ready = std::find_if(waiting.begin(), waiting.end(), [&](const Waiting& w) {
-          return others_are_done(*w.chunk, drive.step);
-        });
+        const auto ready = std::find_if(waiting.begin(), waiting.end(),
+                                        [&](const Waiting& w) { return is_ready(*w.chunk); });
         if (ready != waiting.end()) {
           complete(*ready);
           waiting.erase(ready);
@@ -728,9 +783,10 @@ State PairEngine::state() const {
   s.x_start = x_start_;
   Drive drive = course_.drive;
   if (!closed_) {
-    drive.close(scene_, sum_reactions(drive.step));
+    drive.close(scene_, sum_reactions(drive.step), water_at(drive.step));
     drive.ledger.slip += pending_slip();
   }
+  for (std::int64_t i = 0; i < water_.size(); ++i) s.water_force.push_back(water_.data()[i].f);
   for (Index i = 0; i < n_; ++i) append_grain(s, grain_.data()[i], load_.data()[i], role_.data()[i]);
   for (const Chunk& chunk : chunks_) {
     for (int part = 0; part < 2; ++part)

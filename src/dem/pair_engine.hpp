@@ -20,6 +20,7 @@
 #include "dem/contact.hpp"
 #include "dem/drive.hpp"
 #include "dem/engine.hpp"
+#include "dem/engine_parts.hpp"
 #include "dem/leapfrog.hpp"
 #include "dem/neighbours.hpp"
 
@@ -29,7 +30,7 @@ class PairEngine final : public Engine {
  public:
   explicit PairEngine(int threads);  // 0: by the number of grains
 
-  void load(const Scene& scene, const State& state) override;
+  void load(const Scene& scene, const State& state, Surroundings* surroundings) override;
   void advance(std::int64_t steps) override;
   State state() const override;
   Counts counts() const override;
@@ -131,6 +132,10 @@ class PairEngine final : public Engine {
   double sum_slip(std::int64_t step) const;
   bool others_are_done(const Chunk& chunk, std::int64_t step) const;
   double pending_slip() const;
+  bool kicked_at(std::int64_t step) const { return exchanges(scene_, step); }
+  WaterReaction water_at(std::int64_t step) const;
+  void exchange_alone();
+  LoadRow with_water(LoadRow load, Index i, std::int64_t step) const;
 
   template <Features F>
   Pause run(std::int64_t& steps, bool& at_forces);
@@ -174,6 +179,11 @@ class PairEngine final : public Engine {
   Host::Array<LoadRow> slot_;
   Host::Array<LoadRow> damping_, damping_slot_;  // the viscous part of them, where the ledger asks for it
   std::vector<Buffers> buffers_;                 // by thread
+  Surroundings* surroundings_ = nullptr;
+  Host::Array<WaterRow> water_;           // with surroundings only: at the last exchange
+  WaterReaction water_reaction_;          // likewise
+  std::atomic<int> displaced_{0};         // threads that have, at the present exchange
+  std::atomic<std::int64_t> solved_{-1};  // the last exchange whose pressures are known
   Host::Array<Role> role_;
   Neighbours<Host> neighbours_;
   Course course_;

@@ -61,8 +61,10 @@ struct Scene {
   double neighbour_margin = 0;  // m; 0: chosen from the grains. Never changes a result.
   bool ledger = true;           // account for every joule (state.hpp)
 
-  double area() const { return box.x * box.y; }                                         // m2
-  double submerged_gravity() const { return gravity * (1 - fluid_density / density); }  // m/s2, less buoyancy
+  double area() const { return box.x * box.y; }  // m2
+  MORAINE_HD double submerged_gravity() const {
+    return gravity * (1 - fluid_density / density);
+  }  // m/s2, less buoyancy
 
   // s, since the stage began.
   MORAINE_HD double time(std::int64_t step) const { return time_0 + static_cast<double>(step - step_0) * dt; }

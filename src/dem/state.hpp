@@ -37,18 +37,28 @@ struct Ledger {
   double top_wall = 0;       // work done on the grains and the wall by the load
   double layers = 0;         // work done on the grains by the driven layers
   double viscous_power = 0;  // W, at the present step
+  double water = 0;          // work done on the grains and the wall by pore water
+};
+
+// What pore water does at one step, beside its forces on grains; multiplied as those are (surroundings.hpp).
+struct WaterReaction {
+  double wall = 0;          // N, on the top wall, upwards
+  double layer = 0;         // N, x force on the grains of the top layer
+  double work = 0;          // J, done on grains and wall since the last exchange
+  double wall_between = 0;  // N, on the top wall at the steps up to the next exchange
 };
 
 struct State {
-  std::vector<Index> id;        // 0 .. N-1, the row in every output file
-  std::vector<double> r;        // m
-  std::vector<Vec3d> x;         // m; not wrapped into the box while a stage runs
-  std::vector<Vec3d> v;         // m/s
-  std::vector<Vec3d> omega;     // rad/s
-  std::vector<Vec3d> rotation;  // rad, integral of omega (par. 45)
-  std::vector<Vec3d> force;     // N, by contacts with grains and walls at step n; without gravity
-  std::vector<Vec3d> torque;    // N m
-  std::vector<Vec3d> x_start;   // m, where the displacement is counted from
+  std::vector<Index> id;           // 0 .. N-1, the row in every output file
+  std::vector<double> r;           // m
+  std::vector<Vec3d> x;            // m; not wrapped into the box while a stage runs
+  std::vector<Vec3d> v;            // m/s
+  std::vector<Vec3d> omega;        // rad/s
+  std::vector<Vec3d> rotation;     // rad, integral of omega (par. 45)
+  std::vector<Vec3d> force;        // N, by contacts with grains and walls at step n; without gravity
+  std::vector<Vec3d> torque;       // N m
+  std::vector<Vec3d> water_force;  // N, by pore water at the last exchange; empty where there is none
+  std::vector<Vec3d> x_start;      // m, where the displacement is counted from
   std::vector<Role> role;
   std::vector<Contact> contacts;           // overlapping pairs, sorted by (i, j)
   std::vector<WallContact> wall_contacts;  // sorted by (wall, i)
@@ -57,6 +67,7 @@ struct State {
   double wall_v = 0;       // m/s
   double wall_force = 0;   // N, of the grains on the top wall, upwards
   double shear_force = 0;  // N, sum of x forces of the grains on the top layer
+  WaterReaction water;     // at the present step
   double layer_u = 0;      // m/s, velocity of the top layer
   Ledger ledger;
 

@@ -172,7 +172,7 @@ TEST(Lanes, SameBitsAsPairs) {
       HostOfLanes space;
       space.blocks = blocks, space.units_at_once = units_at_once;
       GatherEngine<HostOfLanes> engine(space, "lanes on the host");
-      engine.load(scene, start);
+      engine.load(scene, start, nullptr);
       engine.advance(1);
       engine.advance(steps - 1);
       expect_same_bits(engine.state(), by_pairs);
