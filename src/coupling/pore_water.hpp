@@ -1,0 +1,58 @@
+// Pore water that grains displace and that pushes them: Darcy flow on a grid (src/fluid) coupled to the
+// grains by a scheme that conserves water, momentum and energy. At an exchange, m steps after the last one:
+//
+//   U_f = A_f sum_i b_if (x_i - x_i at the last exchange)        solids through face f, m3
+//   (C + Delta L) p = q - div U, q <- q - div U - Delta L p      fluid/step.hpp, Delta = m dt
+//   f_i = -sum_f b_if A_f (p_above - p_below)                    N, = -V/(1 - phi) grad p
+//
+// b_if = V_i w_if / sum_j V_j w_jf: hats about the face's centre, made to reproduce affine motion
+// (mapping.hpp), so that shear of a bed of few grains makes no false divergence. Force and displacement share
+// them: the work on the grains is the work of the pressure, and momentum telescopes. Along z the grid is
+// stretched between floor and wall. An impermeable wall displaces A dH and carries p A; a drained one carries
+// the pressure of the side.
+#pragma once
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "coupling/water.hpp"
+#include "dem/scene.hpp"
+#include "dem/state.hpp"
+#include "dem/surroundings.hpp"
+
+namespace moraine::coupling {
+
+// How often grains and water must meet. Undrained water and skeleton swing with w_f and w_sk at most, and
+// with impulses every m steps they stay bounded while m dt sqrt(w_sk^2 + w_f^2) < 2.
+struct Stability {
+  double w_sk = 0,
+         w_f = 0;  // rad/s; largest of the dry contact network, and of the grains on the water's stiffness
+  std::int64_t longest = 0;  // steps; 0: not even every step
+  double longest_dt = 0;     // s, with which an exchange at every step would be stable
+};
+
+class PoreWater : public dem::Surroundings {
+ public:
+  virtual std::int64_t interval() const = 0;  // steps, chosen or checked
+  virtual Stability stability() const = 0;
+  virtual WaterState state() const = 0;  // after an exchange
+  virtual WaterFields fields() const = 0;
+  // Shear zone: cells whose centres lie above `from_z`, m.
+  virtual WaterRecord record(double from_z) const = 0;
+  virtual std::string describe()
+      const = 0;  // e.g. "water: 8 x 8 x 7 cells of 0.105 m (2.6 d), exchange every step, pcg"
+};
+
+// Whether this build has pore water in it (MORAINE_FLUID).
+bool water_built();
+
+// `grains`: at the start of a stage (or at an exchange, after a restart). `before`: what an earlier stage or
+// a checkpoint left; empty q: the pressure of the top everywhere. restart: go on with the same bits. Throws
+// Error where the description contradicts itself, where the grid is finer than memory allows, where the
+// interval that is asked for is unstable (naming the longest that is not), and in builds without
+// MORAINE_FLUID.
+std::unique_ptr<PoreWater> make_pore_water(const Water& water, const dem::Scene& scene,
+                                           const dem::State& grains, const WaterState& before, bool restart);
+
+}  // namespace moraine::coupling
