@@ -1,0 +1,87 @@
+// Weights that carry motion from grains to the faces of the grid, and forces back.
+//
+//   U_f = sum_i b_if d_i,   f_i = sum_f b_if g_f          d_i: displacement along the face's axis, m; g_f: Pa
+//   b_if = A_f V_i w_if (1 + a_f . xi_i) / W_f,   W_f = max(sum_i V_i w_if (1 + a_f . xi_i), psi_min V_cell)
+//
+// w_if: product of hats in all three directions about the face's centre x_f, one cell wide to either side;
+// they sum to one over the faces of an axis. xi = (x_i - x_f)/h. a_f makes the weighted mean of xi vanish, so
+// that U of an affine motion is A_f v(x_f): plain hats have their mean where grains happen to be, and shear
+// of the bed then passes for divergence. At an open side, where all grains are on one side, only along the
+// side. Where there are few grains (a solid fraction below 0.2) a_f fades away, and below psi_min forces do,
+// lest a lonely grain carry a whole face.
+//
+// The weights stay as they are until grains have moved by a hundredth of a cell (PoreWater); so long the sums
+// are plain products over lists, by chunk of grains (grain.hpp) and within it by the eight faces that grains
+// share, four grains at a time.
+#pragma once
+#include <array>
+#include <vector>
+
+#include "backend/number.hpp"
+#include "dem/grain.hpp"
+#include "fluid/grid.hpp"
+
+namespace moraine::coupling {
+
+using dem::Index;
+
+// A number for each face of each axis.
+using Faces = std::array<std::vector<double>, 3>;
+
+class Mapping {
+ public:
+  static constexpr double psi_min = 0.1;
+
+  // open_low, open_high: whether solids may be pushed at the sides along z, where water passes (others are
+  // closed).
+  void build(const fluid::Grid& grid, const std::array<bool, 3>& open_low,
+             const std::array<bool, 3>& open_high, const dem::GrainRow* grains,
+             const std::vector<dem::Vec3d>& x, const std::vector<bool>& top_layer);
+  // Displacements are counted from here, memory order.
+  void start_from(const std::vector<dem::Vec3d>& x);
+  std::vector<dem::Vec3d> last() const;  // where they are counted from now
+
+  Index chunks() const { return static_cast<Index>(chunks_.size()); }
+  // Adds up a chunk's part of U and moves on. Chunks may be done by different threads.
+  void displace(Index chunk, const dem::GrainRow* grains);
+  // U of all chunks, in their order; and the largest displacement of any grain along an axis, m.
+  double collect(Faces& u) const;
+  // The forces on a chunk's grains.
+  void push(Index chunk, const Faces& g, dem::WaterRow* force) const;
+
+  // The same sums for any vectors by grain, for the analysis of stability; slow.
+  void apply(const std::vector<dem::Vec3d>& d, Faces& u) const;
+
+  const Faces& layer() const { return layer_; }         // m2, sum of b over the grains of the top layer
+  const Faces& solid_fraction() const { return psi_; }  // 1, about each face: sum of V w over the volume of w
+  const std::vector<double>& porosity() const { return phi_; }  // of each cell, by hats about its centre
+
+ private:
+  struct Bin {
+    std::array<Index, 8> face;  // of the grid
+    std::array<Index, 8> slot;  // of the chunk's own sums
+    Index first, packs;
+    int in_last;  // grains in the last pack
+  };
+  struct Lane4 {
+    std::array<Pack, 8> b;
+    Pack last;  // m
+    std::array<Index, 4> grain;
+  };
+  struct Axis {
+    std::vector<Bin> bins;
+    std::vector<Lane4> packs;
+    std::vector<Index> face;  // of each slot
+    std::vector<double> sum;
+  };
+  struct alignas(64) Chunk {
+    std::array<Axis, 3> axis;
+    double moved = 0;
+  };
+  std::vector<Chunk> chunks_;
+  Faces layer_, psi_;
+  std::vector<double> phi_;
+  Index n_ = 0;
+};
+
+}  // namespace moraine::coupling

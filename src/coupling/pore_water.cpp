@@ -1,0 +1,441 @@
+#include "coupling/pore_water.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "coupling/mapping.hpp"
+#include "dem/engine_parts.hpp"
+#include "dem/spectrum.hpp"
+#include "error.hpp"
+#include "fluid/step.hpp"
+
+namespace moraine::coupling {
+
+namespace {
+
+using dem::Vec3d;
+
+constexpr double map_lasts = 0.01;  // of a cell, that grains may move before the weights are made anew
+constexpr double most_of_limit =
+    0.9;  // of the step at which grains and water would swing up: contacts come and go
+constexpr int power_iterations = 60;
+
+bool has_wall(const dem::Scene& s) { return s.top_wall.drive != dem::TopWall::Drive::none; }
+
+class GridWater final : public PoreWater {
+ public:
+  GridWater(const Water& water, const dem::Scene& scene, const dem::State& s, const WaterState& before,
+            bool restart)
+      : water_(water),
+        scene_(scene),
+        grid_(grid_of(water, scene, s, before, restart)),
+        step_(grid_, sides_of(water), options_of(water)) {
+    const auto n = static_cast<std::size_t>(s.size());
+    x_.resize(n), top_layer_.resize(n), volume_.resize(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      x_[i] = s.x[i], top_layer_[i] = s.role[i] == dem::Role::top;
+      volume_[i] = dem::sphere_volume(s.r[i]), solids_ += volume_[i];
+    }
+    grains_ = dem::grain_rows(scene, s);
+    for (int a = 0; a < 3; ++a) {
+      u_[a].resize(grid_.face_count(a)), g_[a].resize(grid_.face_count(a));
+    }
+    div_u_.resize(grid_.cells());
+    closed_ = water.top == TopSide::impermeable;
+
+    if (restart) {
+      now_ = before;
+      map(now_.x_map);
+      mapping_.start_from(s.x);
+      t_ = scene.time(s.step);
+      gradients(t_);
+      stale_ = now_.moved > map_lasts * least_cell();
+    } else {
+      map(s.x);
+      now_.wall_z = s.wall_z;
+      begin(before);
+      t_ = scene.time(s.step);
+    }
+    choose_interval(s);
+  }
+
+  bool stale() const override { return stale_; }
+
+  void remap(const dem::GrainRow* grains, const dem::Drive& drive) override {
+    const std::vector<Vec3d> last = mapping_.last();
+    std::vector<Vec3d> x(x_.size());
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] = grains[i].x;
+    if (has_wall(scene_)) grid_.length[2] = drive.wall_z;
+    map(x);
+    mapping_.start_from(last);
+  }
+
+  void displace(dem::Index chunk, const dem::GrainRow* grains) override { mapping_.displace(chunk, grains); }
+
+  dem::WaterReaction solve(const dem::Drive& drive, double t) override {
+    const double moved = mapping_.collect(u_);
+    const double wall_dz = has_wall(scene_) ? drive.wall_z - now_.wall_z : 0;
+    const int nx = grid_.n[0], ny = grid_.n[1], nz = grid_.n[2];
+    const double column = grid_.face_area(2);
+    if (closed_)
+      for (std::size_t f = grid_.face(2, 0, 0, nz); f < u_[2].size(); ++f) u_[2][f] = column * wall_dz;
+    divergence();
+
+    std::swap(g_, before_);
+    if (g_[0].size() != before_[0].size()) g_ = before_;
+    const double wall_before = now_.wall_pressure;
+    if (const double dt = t - t_; dt > 0) {
+      double out_top = 0;
+      for (std::size_t f = grid_.face(2, 0, 0, nz); f < u_[2].size(); ++f) out_top += u_[2][f];
+      const fluid::Exchanged in = step_.step(t, dt, div_u_, now_.q, now_.p);
+      // What grains push out through a drained wall that does not follow them is water, too.
+      now_.drained_top += (out_top - scene_.area() * wall_dz) - in.high[2];
+      double out_bottom = 0;
+      for (std::size_t f = 0; f < static_cast<std::size_t>(nx) * ny; ++f) out_bottom -= u_[2][f];
+      now_.drained_bottom += out_bottom - in.low[2];
+      now_.drained_sides -= in.low[0] + in.high[0] + in.low[1] + in.high[1];
+      now_.dissipated += dt * step_.dissipation(t, now_.p);
+      for (int a = 0; a < 3; ++a)
+        now_.side_work += side_pressure(a, false, t) * in.low[a] + side_pressure(a, true, t) * in.high[a];
+    }
+    t_ = t;
+    gradients(t);
+
+    dem::WaterReaction out;
+    for (int a = 0; a < 3; ++a) {
+      const double* const last = before_[a].data();
+      for (std::size_t f = 0; f < g_[a].size(); ++f) out.work += 0.5 * (last[f] + g_[a][f]) * u_[a][f];
+    }
+    if (closed_)  // their displacement is the wall's
+      for (std::size_t f = grid_.face(2, 0, 0, nz); f < u_[2].size(); ++f)
+        out.work -= 0.5 * (before_[2][f] + g_[2][f]) * u_[2][f];
+    for (std::size_t f = 0; f < g_[0].size(); ++f) out.layer += mapping_.layer()[0][f] * g_[0][f];
+    const double m = static_cast<double>(interval_);
+    out.layer *= m;
+    if (has_wall(scene_)) {
+      const double force = now_.wall_pressure * scene_.area();
+      out.wall = closed_ ? m * force : force, out.wall_between = closed_ ? 0 : force;
+      out.work += 0.5 * (wall_before + now_.wall_pressure) * scene_.area() * wall_dz;
+      now_.wall_z = drive.wall_z;
+    }
+    now_.moved += moved + std::abs(wall_dz);
+    stale_ = now_.moved > map_lasts * least_cell();
+    ++now_.exchanges;
+    return out;
+  }
+
+  void push(dem::Index chunk, dem::WaterRow* force) override { mapping_.push(chunk, g_, force); }
+
+  std::int64_t interval() const override { return interval_; }
+  Stability stability() const override { return stability_; }
+  WaterState state() const override { return now_; }
+
+  WaterFields fields() const override {
+    WaterFields out{grid_, now_.p, mapping_.porosity(), medium_.permeability, {}};
+    out.flux.resize(grid_.cells());
+    for (int a = 0; a < 3; ++a) {
+      std::vector<double> flow(grid_.face_count(a));
+      step_.flux(a, t_, now_.p, flow);
+      for_each_cell(
+          [&](std::size_t c, std::size_t low, std::size_t high) {
+            out.flux[c][a] = 0.5 * (flow[low] + flow[high]) / grid_.face_area(a);
+          },
+          a);
+    }
+    return out;
+  }
+
+  WaterRecord record(double from_z) const override {
+    WaterRecord r;
+    r.least = 1e300, r.most = -1e300;
+    std::size_t count = 0;
+    for (int k = 0; k < grid_.n[2]; ++k) {
+      if ((k + 0.5) * grid_.h(2) < from_z && k + 1 < grid_.n[2]) continue;
+      for (std::size_t c = grid_.cell(0, 0, k); c < grid_.cell(0, 0, k + 1); ++c, ++count) {
+        r.mean += now_.p[c];
+        r.least = std::min(r.least, now_.p[c]), r.most = std::max(r.most, now_.p[c]);
+      }
+    }
+    r.mean /= static_cast<double>(count);
+    for (std::size_t c = 0; c < now_.q.size(); ++c)
+      r.stored += 0.5 * now_.q[c] * now_.q[c] / step_.storage()[c];
+    r.volume = water_volume();
+    r.balance = r.volume + now_.drained_top + now_.drained_bottom + now_.drained_sides - now_.volume_0;
+    return r;
+  }
+
+  std::string describe() const override {
+    double d = 0;
+    for (const double v : volume_) d += 2 * std::cbrt(v * 3 / (4 * std::numbers::pi));
+    d /= static_cast<double>(volume_.size());
+    std::ostringstream out;
+    out.precision(3);
+    out << "water: " << grid_.n[0] << " x " << grid_.n[1] << " x " << grid_.n[2] << " cells of " << grid_.h(0)
+        << " x " << grid_.h(1) << " x " << grid_.h(2) << " m (" << std::cbrt(grid_.cell_volume()) / d
+        << " d), exchange every ";
+    if (interval_ == 1)
+      out << "step";
+    else
+      out << interval_ << " steps";
+    out << " (at most " << stability_.longest << "), " << step_.report().solver;
+    return out.str();
+  }
+
+ private:
+  static fluid::Grid grid_of(const Water& w, const dem::Scene& scene, const dem::State& s,
+                             const WaterState& before, bool restart) {
+    fluid::Grid g;
+    g.n = w.cells;
+    g.periodic = {scene.periodic_x, scene.periodic_y, false};
+    g.length = {scene.box.x, scene.box.y, has_wall(scene) ? s.wall_z : w.height};
+    if (restart) g.length[2] = before.height_map;
+    for (int a = 0; a < 3; ++a)
+      if (!(g.length[a] > 0) || g.n[a] < 1)
+        throw error("pore water: ", g.n[a], " cells over ", g.length[a], " m along ", "xyz"[a],
+                    ": expected at least one cell and a length > 0 m");
+    const double bytes = 600.0 * g.n[0] * g.n[1] * g.n[2];
+    if (bytes > 16e9)
+      throw error("pore water: ", g.n[0], " x ", g.n[1], " x ", g.n[2], " cells need some ", bytes / 1e9,
+                  " GB; expected a larger fluid.cell (2 to 3 mean grain diameters)");
+    return g;
+  }
+  static fluid::Sides sides_of(const Water& w) {
+    fluid::Sides sides = w.sides;
+    if (w.top == TopSide::impermeable) sides.high[2] = {};
+    return sides;
+  }
+  static fluid::SolverOptions options_of(const Water& w) {
+    fluid::SolverOptions o;
+    o.choice = w.solver == Solver::pcg       ? fluid::SolverChoice::pcg
+               : w.solver == Solver::cholmod ? fluid::SolverChoice::cholmod
+                                             : fluid::SolverChoice::automatic;
+    o.tolerance = w.tolerance;
+    return o;
+  }
+
+  double least_cell() const { return std::min({grid_.h(0), grid_.h(1), grid_.h(2)}); }
+
+  const fluid::Side& side(int axis, bool high) const {
+    static const fluid::Side none;
+    if (axis == 2 && high && closed_) return none;
+    return high ? water_.sides.high[axis] : water_.sides.low[axis];
+  }
+  // Pa, where the side has a pressure of its own; others do no work (flux is booked at the cell's).
+  double side_pressure(int axis, bool high, double t) const {
+    if (grid_.periodic[axis]) return 0;
+    const fluid::Side& s = side(axis, high);
+    return s.kind == fluid::Side::Kind::pressure ? s.at(t) : 0;
+  }
+
+  // New weights and all that follows from where grains are.
+  void map(const std::vector<Vec3d>& x) {
+    std::array<bool, 3> low, high;
+    for (int a = 0; a < 3; ++a) {
+      low[a] = side(a, false).kind != fluid::Side::Kind::closed;
+      high[a] = side(a, true).kind != fluid::Side::Kind::closed;
+    }
+    mapping_.build(grid_, low, high, grains_.data(), x, top_layer_);
+    now_.x_map = x, now_.height_map = grid_.length[2], now_.moved = 0;
+    medium_.viscosity = water_.viscosity, medium_.compressibility = water_.compressibility;
+    medium_.porosity = mapping_.porosity();
+    medium_.permeability.resize(grid_.cells());
+    for (std::size_t c = 0; c < grid_.cells(); ++c) {
+      double& phi = medium_.porosity[c];
+      phi = std::clamp(phi, water_.porosity_range[0], water_.porosity_range[1]);
+      medium_.permeability[c] = water_.k_c * phi * phi * phi / ((1 - phi) * (1 - phi));
+    }
+    step_.set(grid_, medium_);
+  }
+
+  // The pressures an earlier stage has left, else that of the top.
+  void begin(const WaterState& before) {
+    const std::vector<double>& storage = step_.storage();
+    now_.q = before.q, now_.p = before.p;
+    if (now_.q.size() != grid_.cells()) {
+      const double p = side_pressure(2, true, 0);
+      now_.q.resize(grid_.cells()), now_.p.assign(grid_.cells(), p);
+      for (std::size_t c = 0; c < grid_.cells(); ++c) now_.q[c] = storage[c] * p;
+    }
+    for (std::size_t c = 0; c < grid_.cells(); ++c) now_.p[c] = now_.q[c] / storage[c];
+    now_.volume_0 = water_volume();
+  }
+
+  double water_volume() const {
+    double volume = scene_.area() * (has_wall(scene_) ? now_.wall_z : grid_.length[2]) - solids_;
+    double stored = 0;
+    for (const double q : now_.q) stored += q;
+    return volume + stored;
+  }
+
+  // use(cell, its low face, its high face) along an axis.
+  template <class Use>
+  void for_each_cell(Use&& use, int axis) const {
+    const int nx = grid_.n[0], ny = grid_.n[1], nz = grid_.n[2];
+    for (int k = 0; k < nz; ++k)
+      for (int j = 0; j < ny; ++j)
+        for (int i = 0; i < nx; ++i) {
+          int to[3] = {i, j, k};
+          ++to[axis];
+          if (grid_.periodic[axis] && to[axis] == grid_.n[axis]) to[axis] = 0;
+          use(grid_.cell(i, j, k), grid_.face(axis, i, j, k), grid_.face(axis, to[0], to[1], to[2]));
+        }
+  }
+
+  void divergence() {
+    std::fill(div_u_.begin(), div_u_.end(), 0.0);
+    for (int a = 0; a < 3; ++a)
+      for_each_cell(
+          [&](std::size_t c, std::size_t low, std::size_t high) { div_u_[c] += u_[a][high] - u_[a][low]; },
+          a);
+  }
+
+  // g_f = -(p above - p below), by the closure times the solid fraction; and the pressure on the wall.
+  void gradients(double t) {
+    const std::vector<double>& p = now_.p;
+    for (int a = 0; a < 3; ++a) {
+      std::fill(g_[a].begin(), g_[a].end(), 0.0);
+      for_each_cell(
+          [&](std::size_t c, std::size_t low, std::size_t high) { g_[a][high] += p[c], g_[a][low] -= p[c]; },
+          a);
+      if (!grid_.periodic[a]) {
+        const double stride = grid_.h(a) / 2;
+        const auto at_side = [&](std::size_t f, std::size_t c, bool high) {
+          const fluid::Side& s = side(a, high);
+          double beyond = p[c];
+          if (s.kind == fluid::Side::Kind::pressure) beyond = s.at(t);
+          if (s.kind == fluid::Side::Kind::flux)
+            beyond = p[c] + s.at(t) * water_.viscosity * stride / medium_.permeability[c];
+          g_[a][f] += high ? -beyond : beyond;
+        };
+        const auto last = [&](int axis) { return axis == a ? 1 : grid_.n[axis]; };
+        for (int k = 0; k < last(2); ++k)
+          for (int j = 0; j < last(1); ++j)
+            for (int i = 0; i < last(0); ++i) {
+              int high[3] = {i, j, k};
+              high[a] = grid_.n[a];
+              at_side(grid_.face(a, i, j, k), grid_.cell(i, j, k), false);
+              const std::size_t f = grid_.face(a, high[0], high[1], high[2]);
+              high[a] -= 1;
+              at_side(f, grid_.cell(high[0], high[1], high[2]), true);
+            }
+      }
+      if (water_.closure == Closure::pressure_gradient)
+        for (std::size_t f = 0; f < g_[a].size(); ++f) g_[a][f] *= mapping_.solid_fraction()[a][f];
+    }
+    if (!has_wall(scene_)) return;
+    if (closed_) {
+      const std::size_t first = grid_.cell(0, 0, grid_.n[2] - 1);
+      double sum = 0;
+      for (std::size_t c = first; c < p.size(); ++c) sum += p[c];
+      now_.wall_pressure = sum / static_cast<double>(p.size() - first);
+    } else {
+      now_.wall_pressure = side_pressure(2, true, t);
+    }
+  }
+
+  // Largest w^2 of grains (and an impermeable wall) on the stiffness of undrained water, by power iteration
+  // on M^-1 B^T D^T C^-1 D B, from above by its last change.
+  double water_frequency() {
+    const auto chunks = mapping_.chunks();
+    std::vector<dem::WaterRow> force(x_.size() + 1, dem::WaterRow{});
+    std::vector<Vec3d> d(x_.size());
+    std::vector<double> p(grid_.cells());
+    Faces u = u_;
+    const Faces g = g_;
+    const std::vector<double> keep = now_.p;
+    const double keep_wall = now_.wall_pressure;
+    for (std::size_t c = 0; c < p.size(); ++c) {
+      int i = static_cast<int>(c) % grid_.n[0], j = static_cast<int>(c) / grid_.n[0] % grid_.n[1],
+          k = static_cast<int>(c) / (grid_.n[0] * grid_.n[1]);
+      p[c] = ((i + j + k) % 2 ? -1 : 1) + 0.3 * std::sin(1.7 * static_cast<double>(c));
+    }
+    double lambda = 0, last = 0;
+    const Closure closure = water_.closure;
+    water_.closure = Closure::full;
+    const fluid::Sides sides = water_.sides;
+    for (auto* list : {&water_.sides.low, &water_.sides.high})
+      for (fluid::Side& s : *list) s.value = s.amplitude = 0;
+    for (int n = 0; n < power_iterations; ++n) {
+      double norm = 0;
+      for (const double v : p) norm += v * v;
+      norm = std::sqrt(norm / static_cast<double>(p.size()));
+      for (double& v : p) v /= norm;
+      now_.p = p;
+      gradients(0);
+      for (dem::Index c = 0; c < chunks; ++c) mapping_.push(c, g_, force.data());
+      for (std::size_t i = 0; i < x_.size(); ++i) d[i] = (1 / (scene_.density * volume_[i])) * force[i].f;
+      mapping_.apply(d, u);
+      if (closed_) {
+        const double a = scene_.top_wall.drive == dem::TopWall::Drive::stress
+                             ? now_.wall_pressure * scene_.area() / scene_.top_wall.mass
+                             : 0;
+        for (std::size_t f = grid_.face(2, 0, 0, grid_.n[2]); f < u[2].size(); ++f)
+          u[2][f] = grid_.face_area(2) * a;
+      }
+      std::swap(u, u_);
+      divergence();
+      std::swap(u, u_);
+      last = lambda;
+      double along = 0, norm2 = 0;
+      for (std::size_t c = 0; c < p.size(); ++c) {
+        const double next = div_u_[c] / step_.storage()[c];
+        along += next * p[c], norm2 += p[c] * p[c];
+        p[c] = next;
+      }
+      lambda = along / norm2;
+    }
+    now_.p = keep, now_.wall_pressure = keep_wall, g_ = g, water_.closure = closure, water_.sides = sides;
+    return lambda + std::abs(lambda - last);
+  }
+
+  void choose_interval(const dem::State& s) {
+    stability_.w_sk = std::sqrt(dem::spectrum(scene_, s).stiffness);
+    // A bed that has not met yet will.
+    stability_.w_sk = std::max(stability_.w_sk, 2 / dem::one_contact_step(scene_, s));
+    stability_.w_f = std::sqrt(water_frequency());
+    const double w = std::hypot(stability_.w_sk, stability_.w_f);
+    stability_.longest_dt = most_of_limit * 2 / w;
+    stability_.longest = static_cast<std::int64_t>(stability_.longest_dt / scene_.dt);
+    if (stability_.longest < 1)
+      throw error("pore water: grains on the water's stiffness swing at ", stability_.w_f,
+                  " rad/s, the contacts at ", stability_.w_sk, " rad/s, so a step of ", scene_.dt,
+                  " s is unstable even with an exchange at each; expected a step of at most ",
+                  stability_.longest_dt, " s (a smaller model.f), larger cells, or a heavier wall.mass");
+    if (water_.interval > stability_.longest)
+      throw error("fluid.exchange_interval = ", water_.interval, ": unstable; expected at most ",
+                  stability_.longest, " steps of ", scene_.dt, " s (contacts swing at ", stability_.w_sk,
+                  " rad/s, the water at ", stability_.w_f, " rad/s), or 0 for an automatic one");
+    interval_ = water_.interval > 0 ? water_.interval : stability_.longest;
+  }
+
+  Water water_;
+  dem::Scene scene_;
+  fluid::Grid grid_;
+  fluid::PressureStep step_;
+  fluid::Medium medium_;
+  Mapping mapping_;
+  bool closed_ = false, stale_ = false;
+  std::vector<Vec3d> x_;
+  std::vector<double> volume_;  // m3, of each grain
+  std::vector<bool> top_layer_;
+  std::vector<dem::GrainRow> grains_;  // radii
+  double solids_ = 0;                  // m3
+  Faces u_, g_, before_;
+  std::vector<double> div_u_;
+  double t_ = 0;
+  WaterState now_;
+  Stability stability_;
+  std::int64_t interval_ = 1;
+};
+
+}  // namespace
+
+bool water_built() { return true; }
+
+std::unique_ptr<PoreWater> make_pore_water(const Water& water, const dem::Scene& scene,
+                                           const dem::State& grains, const WaterState& before, bool restart) {
+  return std::make_unique<GridWater>(water, scene, grains, before, restart);
+}
+
+}  // namespace moraine::coupling
