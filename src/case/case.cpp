@@ -55,6 +55,7 @@ class Reader {
   double number(const string& key) const { return std::get<double>(entries_.at(key).value); }
   string text(const string& key) const { return std::get<string>(entries_.at(key).value); }
   bool flag(const string& key) const { return std::get<bool>(entries_.at(key).value); }
+  bool automatic_dt() const { return std::holds_alternative<string>(entries_.at("model.dt").value); }
 
   template <class... Parts>
   void expect(bool right, const string& key, const Parts&... parts) const {
@@ -74,10 +75,39 @@ void check_case(const Entries& entries) {
     c.expect(c.number("grains.radius_max") >= c.number("grains.radius_min"), "grains.radius_max",
              "at least grains.radius_min = ", c.number("grains.radius_min"));
   }
+  c.expect(c.number("fluid.porosity_min") < c.number("fluid.porosity_max"), "fluid.porosity_min",
+           "less than fluid.porosity_max = ", c.number("fluid.porosity_max"));
+  c.expect(c.number("fluid.porosity_max") < 1, "fluid.porosity_max", "less than 1");
   if (c.text("box.periodic").find('z') != string::npos) {
     c.expect(c.number("box.z") > 0, "box.z", "> 0 m where z is periodic");
     c.expect(!c.flag("box.floor"), "box.floor", "false where z is periodic");
   }
+}
+
+void check_water(const Reader& s, const Reader& above, bool no_wall) {
+  const bool tight = s.text("stage.fluid_top") == "impermeable";
+  const string bottom = s.text("stage.fluid_bottom");
+  for (const char* key : {"stage.top_pressure", "stage.top_pressure_amplitude"})
+    s.expect(!tight || s.number(key) == 0, key, "0 Pa: the top is impermeable");
+  s.expect(s.number("stage.top_pressure_amplitude") == 0 || s.number("stage.top_pressure_frequency") > 0,
+           "stage.top_pressure_frequency", "> 0 Hz with an amplitude");
+  s.expect(bottom == "pressure" || s.number("stage.bottom_pressure") == 0, "stage.bottom_pressure",
+           "0 Pa, or fluid_bottom = \"pressure\"");
+  s.expect(bottom == "flux" || s.number("stage.bottom_flux") == 0, "stage.bottom_flux",
+           "0 m/s, or fluid_bottom = \"flux\"");
+  if (!s.flag("stage.fluid")) {
+    s.expect(!tight, "stage.fluid_top",
+             "drained: there is no pore water in this stage (fluid.enabled, stage.fluid)");
+    s.expect(s.number("stage.top_pressure") == 0 && s.number("stage.top_pressure_amplitude") == 0,
+             "stage.top_pressure", "0 Pa: there is no pore water in this stage");
+    return;
+  }
+  s.expect(!(tight && no_wall), "stage.fluid_top", "drained: there is no top wall to be impermeable");
+  s.expect(above.text("box.periodic").find('z') == string::npos, "stage.fluid",
+           "false where z is periodic: water needs a bottom and a top");
+  s.expect(above.flag("box.floor"), "stage.fluid", "false without a floor");
+  s.expect(!above.automatic_dt(), "stage.fluid",
+           "false with model.dt = \"auto\": water and grains meet every so many equal steps");
 }
 
 void check_stage(const Entries& entries, const Entries& above, const Context& context) {
@@ -128,6 +158,7 @@ void check_stage(const Entries& entries, const Entries& above, const Context& co
     s.expect(wall == "none" || (wall == "automatic" && kind == "settle"), "stage.top_wall",
              "none where z is periodic");
 
+  check_water(s, Reader(above), wall == "none" || (wall == "automatic" && kind == "settle"));
   s.expect(s.number("stage.mu_d") <= s.number("stage.mu_s"), "stage.mu_d",
            "at most mu_s = ", s.number("stage.mu_s"));
 }
@@ -173,6 +204,10 @@ string text_of(const Draft& draft) {
 }
 
 }  // namespace
+
+bool Case::has_water() const {
+  return std::any_of(stages.begin(), stages.end(), [](const Stage& s) { return s.fluid; });
+}
 
 Case load(const fs::path& directory, const std::vector<Override>& overrides) {
   Draft draft = read(directory, overrides);

@@ -24,7 +24,29 @@ struct Grains {
   bool operator==(const Grains&) const = default;
 };
 
+// Pore water (src/coupling).
+struct Fluid {
+  enum class Closure { full, pressure_gradient };
+  enum class Solver { automatic, pcg, cholmod };
+  bool enabled;
+  double viscosity;                        // Pa s
+  double compressibility;                  // 1/Pa
+  double density;                          // kg/m3
+  double permeability_factor;              // m2, k_c; 0: d^2/180
+  double porosity_min, porosity_max;       // 1, kept within for permeability and storage
+  double cell;                             // mean diameters
+  std::int64_t cells_x, cells_y, cells_z;  // 0: by `cell`
+  double height;                           // m, of the grid where there is no top wall; 0: the bed and a cell
+  Closure closure;
+  std::int64_t exchange_interval;  // steps; 0: the longest that is stable
+  Solver solver;
+  double tolerance;
+  bool operator==(const Fluid&) const = default;
+};
+
 struct Stage {
+  enum class FluidTop { drained, impermeable };
+  enum class FluidBottom { no_flow, pressure, flux };
   enum class Kind { settle, consolidate, shear, shear_stress, uniaxial };
   enum class TopWall { automatic, stress, fixed, none };
   std::string name;
@@ -46,6 +68,12 @@ struct Stage {
   double wall_mu;
   bool zero_kinematics;  // velocities, spins and rotations set to zero when the stage begins
   bool clear_history;    // tangential springs forgotten when the stage begins
+  bool fluid;            // pore water in this stage
+  FluidTop fluid_top;
+  double top_pressure, top_pressure_amplitude, top_pressure_frequency, top_pressure_phase;  // Pa, Hz, rad
+  FluidBottom fluid_bottom;
+  double bottom_pressure;  // Pa
+  double bottom_flux;      // m/s, upwards into the bed
   bool operator==(const Stage&) const = default;
 };
 
@@ -84,11 +112,13 @@ struct Case {
   double safety;            // of the critical step, with automatic_dt
   double neighbour_margin;  // m; 0: automatic
   bool ledger;
+  Fluid fluid;
   std::vector<Stage> stages;
   Output output;
   Guards guards;
 
-  std::string resolved;  // the merged case.toml, SI numbers, ready to be written and read again
+  bool has_water() const;  // in any stage
+  std::string resolved;    // the merged case.toml, SI numbers, ready to be written and read again
   bool operator==(const Case&) const = default;
 };
 

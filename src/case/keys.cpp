@@ -78,6 +78,8 @@ std::vector<Key> make_keys() {
   constexpr auto grains = &C::grains;
   constexpr auto output = &C::output;
   constexpr auto guards = &C::guards;
+  using F = Fluid;
+  constexpr auto fluid = &C::fluid;
   const string sheared = "shear, shear_stress", damped = "; settle, consolidate: ";
   return {
       // clang-format off
@@ -125,6 +127,23 @@ std::vector<Key> make_keys() {
       row<&C::neighbour_margin>("model.neighbour_margin", "m", "0", ">= 0", "of the neighbour list; 0: automatic; changes no result"),
       row<&C::ledger>("model.ledger", "", "true", "", "account for every joule"),
 
+      row<fluid, &F::enabled>("fluid.enabled", "", "false", "", "pore water in the stages; a stage may say otherwise"),
+      row<fluid, &F::viscosity>("fluid.viscosity", "Pa s", "1.8e-3", "> 0", "of the water"),
+      row<fluid, &F::compressibility>("fluid.compressibility", "1/Pa", "4.5e-10", "> 0", "of the water"),
+      row<fluid, &F::density>("fluid.density", "kg/m3", "1000", "> 0", "of the water, for buoyancy"),
+      row<fluid, &F::permeability_factor>("fluid.permeability_factor", "m2", "0", ">= 0", "k_c of k = k_c phi^3/(1 - phi)^2; 0: d^2/180, d the mean diameter"),
+      row<fluid, &F::porosity_min>("fluid.porosity_min", "1", "0.1", "> 0", "storage and permeability take no lower porosity"),
+      row<fluid, &F::porosity_max>("fluid.porosity_max", "1", "0.9", "> 0", "nor a higher one"),
+      row<fluid, &F::cell>("fluid.cell", "1", "2.5", "> 0", "side of a grid cell in mean diameters, at least; below 2 it measures pores"),
+      row<fluid, &F::cells_x>("fluid.cells_x", "", "0", ">= 0", "cells of the grid along x; 0: by fluid.cell"),
+      row<fluid, &F::cells_y>("fluid.cells_y", "", "0", ">= 0", "along y"),
+      row<fluid, &F::cells_z>("fluid.cells_z", "", "0", ">= 0", "along z, between floor and top wall"),
+      row<fluid, &F::height>("fluid.height", "m", "0", ">= 0", "of the grid where there is no top wall; 0: the bed and one cell"),
+      row<fluid, &F::closure>("fluid.closure", "", "\"full\"", "full | pressure_gradient", "force on a grain: -V/(1 - phi) grad p, or -V grad p without the drag"),
+      row<fluid, &F::exchange_interval>("fluid.exchange_interval", "", "0", ">= 0", "steps between exchanges of grains and water; 0: the longest that is stable"),
+      row<fluid, &F::solver>("fluid.solver", "", "\"automatic\"", "automatic | pcg | cholmod", "for the pressure"),
+      row<fluid, &F::tolerance>("fluid.tolerance", "1", "1e-10", "> 0", "of the residual over the right-hand side (pcg)"),
+
       row<&S::name>("stage.name", "", required, "", "unique; letters, digits, - and _"),
       row<&S::kind>("stage.kind", "", required, "settle | consolidate | shear | shear_stress | uniaxial", "what is done to the bed"),
       row<&S::duration>("stage.duration", "s", "0", ">= 0", "of the stage; this or strain"),
@@ -150,6 +169,15 @@ std::vector<Key> make_keys() {
       row<&S::wall_mu>("stage.wall_mu", "1", "0" + damped + "stage.mu_d", ">= 0", "friction against walls"),
       row<&S::zero_kinematics>("stage.zero_kinematics", "", "true", "", "velocities, spins and rotations begin at zero"),
       row<&S::clear_history>("stage.clear_history", "", "false", "", "tangential springs are forgotten when the stage begins"),
+      row<&S::fluid>("stage.fluid", "", "fluid.enabled", "", "pore water in this stage"),
+      row<&S::fluid_top>("stage.fluid_top", "", "\"drained\"", "drained | impermeable", "the top: at top_pressure, or tight (then the wall carries the water's pressure)"),
+      row<&S::top_pressure>("stage.top_pressure", "Pa", "0", "", "over hydrostatic, at a drained top"),
+      row<&S::top_pressure_amplitude>("stage.top_pressure_amplitude", "Pa", "0", "", "of a sinusoid added to top_pressure"),
+      row<&S::top_pressure_frequency>("stage.top_pressure_frequency", "Hz", "0", ">= 0", "of that sinusoid"),
+      row<&S::top_pressure_phase>("stage.top_pressure_phase", "rad", "0", "", "of that sinusoid when the stage begins"),
+      row<&S::fluid_bottom>("stage.fluid_bottom", "", "\"no_flow\"", "no_flow | pressure | flux", "the floor: tight, at bottom_pressure, or with bottom_flux through it"),
+      row<&S::bottom_pressure>("stage.bottom_pressure", "Pa", "0", "", "over hydrostatic, at the floor"),
+      row<&S::bottom_flux>("stage.bottom_flux", "m/s", "0", "", "Darcy velocity through the floor, upwards"),
 
       row<output, &O::series_interval>("output.series_interval", "s", "0.05", "> 0", "of model time"),
       row<output, &O::snapshot_interval>("output.snapshot_interval", "s", "0.5", "> 0", "of model time"),

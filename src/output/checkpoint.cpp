@@ -134,10 +134,28 @@ constexpr std::tuple members<dem::State>{
 
 template <>
 constexpr std::tuple members<SnapshotInfo>{
-    Member{"file", &SnapshotInfo::file},
-    Member{"time", &SnapshotInfo::time},
-    Member{"grains", &SnapshotInfo::grains},
-    Member{"contacts", &SnapshotInfo::contacts},
+    Member{"file", &SnapshotInfo::file},       Member{"time", &SnapshotInfo::time},
+    Member{"grains", &SnapshotInfo::grains},   Member{"contacts", &SnapshotInfo::contacts},
+    Member{"water_x", &SnapshotInfo::water_x}, Member{"water_y", &SnapshotInfo::water_y},
+    Member{"water_z", &SnapshotInfo::water_z}, Member{"water_size", &SnapshotInfo::water_size},
+};
+
+template <>
+constexpr std::tuple members<coupling::WaterState>{
+    Member{"q", &coupling::WaterState::q},
+    Member{"p", &coupling::WaterState::p},
+    Member{"x_map", &coupling::WaterState::x_map},
+    Member{"height_map", &coupling::WaterState::height_map},
+    Member{"moved", &coupling::WaterState::moved},
+    Member{"wall_z", &coupling::WaterState::wall_z},
+    Member{"wall_pressure", &coupling::WaterState::wall_pressure},
+    Member{"exchanges", &coupling::WaterState::exchanges},
+    Member{"drained_top", &coupling::WaterState::drained_top},
+    Member{"drained_bottom", &coupling::WaterState::drained_bottom},
+    Member{"drained_sides", &coupling::WaterState::drained_sides},
+    Member{"side_work", &coupling::WaterState::side_work},
+    Member{"dissipated", &coupling::WaterState::dissipated},
+    Member{"volume_0", &coupling::WaterState::volume_0},
 };
 
 template <>
@@ -153,6 +171,7 @@ constexpr std::tuple members<Checkpoint>{
     Member{"finished", &Checkpoint::finished},
     Member{"scene", &Checkpoint::scene},
     Member{"state", &Checkpoint::state},
+    Member{"water", &Checkpoint::water},
     Member{"rows", &Checkpoint::rows},
     Member{"snapshots", &Checkpoint::snapshots},
 };

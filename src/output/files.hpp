@@ -4,10 +4,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "coupling/water.hpp"
 #include "dem/observe.hpp"
 #include "dem/scene.hpp"
 #include "dem/state.hpp"
@@ -42,15 +44,23 @@ struct Row {
   double kinetic, rotational, elastic_normal, elastic_tangential, potential, wall_kinetic;  // J
   double slip, viscous, top_wall_work, layers_work;                                         // J
   double residue;  // J, since the stage began
+  // Pore water; columns only where a stage of the case has some.
+  double wall_water_pressure;                                          // Pa
+  double total_friction;                                               // 1
+  double water_pressure_mean, water_pressure_min, water_pressure_max;  // Pa
+  double water_drained_top, water_drained_bottom;                      // m3
+  double water_volume, water_balance;                                  // m3
+  double water_work, water_stored, water_dissipated;                   // J
 };
-const std::vector<Column>& columns();  // as many as Row has doubles, in its order
+const std::vector<Column>& columns();    // as many as Row has doubles, in its order
+constexpr std::size_t dry_columns = 27;  // of these, the first
 
 // series.h5: one extendible chunked dataset of doubles for each column, each with attributes `units` and
 // `meaning`.
 class Series {
  public:
   // Creates PATH anew holding `rows` (written aside and renamed), then opens it for appending in SWMR mode.
-  Series(const std::filesystem::path& path, const std::vector<Row>& rows);
+  Series(const std::filesystem::path& path, const std::vector<Row>& rows, bool with_water = false);
   ~Series();
   void append(const Row& row);  // flushed: a reader sees it at once
   const std::vector<Row>& rows() const;
@@ -69,11 +79,15 @@ struct SnapshotInfo {
   std::string file;  // name within snapshots/
   double time;       // s, since the case began
   std::int64_t grains, contacts;
+  std::int64_t water_x = 0, water_y = 0, water_z = 0;  // cells of the water's grid
+  dem::Vec3d water_size{0, 0, 0};                      // m, of that grid
 };
 SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::string& name, double time,
-                            const dem::Scene& scene, const dem::State& staggered);
+                            const dem::Scene& scene, const dem::State& staggered,
+                            const std::optional<coupling::WaterFields>& water = {});
 // snapshots/grains.xdmf and snapshots/contacts.xdmf: time series for ParaView (XDMF 3, Polyvertex with a
-// radius; contacts as points with force vectors). Rewritten whole.
+// radius; contacts as points with force vectors). With pore water also water.xdmf, the grid's cells, and
+// bed.xdmf, grains and grid together. Rewritten whole.
 void write_xdmf(const std::filesystem::path& directory, const std::vector<SnapshotInfo>& snapshots);
 
 // checkpoint.h5: all that is needed to go on with the same bits, the series so far included.
@@ -90,6 +104,7 @@ struct Checkpoint {
   bool finished = false;
   dem::Scene scene;  // of the stage
   dem::State state;
+  coupling::WaterState water;
   std::vector<Row> rows;
   std::vector<SnapshotInfo> snapshots;
 };

@@ -106,6 +106,7 @@ class Group {
     get_attribute(name, element<T>(), &value);
   }
   void get(const std::string& name, std::string& value) const;
+  bool holds(const std::string& name) const { return H5Lexists(id_, name.c_str(), H5P_DEFAULT) > 0; }
   bool has(const std::string& attribute) const { return H5Aexists(id_, attribute.c_str()) > 0; }
 
   // Steps of the above, for datasets that grow: chunk = 0 is a fixed size

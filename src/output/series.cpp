@@ -16,11 +16,11 @@ constexpr hsize_t chunk = 256;  // rows
 
 using Numbers = std::array<double, sizeof(Row) / sizeof(double)>;
 
-void create(const std::filesystem::path& path, const std::vector<Row>& rows) {
+void create(const std::filesystem::path& path, const std::vector<Row>& rows, std::size_t count) {
   const auto file = hdf5::File::create(path);
   file.set("program", std::string("moraine"));
   std::vector<double> numbers(rows.size());
-  for (std::size_t c = 0; c < columns().size(); ++c) {
+  for (std::size_t c = 0; c < count; ++c) {
     const auto& [name, units, meaning] = columns()[c];
     std::transform(rows.begin(), rows.end(), numbers.begin(),
                    [c](const Row& row) { return std::bit_cast<Numbers>(row)[c]; });
@@ -64,6 +64,19 @@ const std::vector<Column>& columns() {
       {"top_wall_work", "J", "work of the load on the top wall since the stage began"},
       {"layers_work", "J", "work of the driven layers since the stage began"},
       {"residue", "J", "energy that the balance leaves unexplained since the stage began"},
+      {"wall_water_pressure", "Pa", "pressure of the water on the top wall, over hydrostatic"},
+      {"total_friction", "1", "shear stress over what grains and water together press on the top wall"},
+      {"water_pressure_mean", "Pa",
+       "mean pressure over hydrostatic: upper half of a sheared bed, else all of it"},
+      {"water_pressure_min", "Pa", "least pressure there"},
+      {"water_pressure_max", "Pa", "largest pressure there"},
+      {"water_drained_top", "m3", "water that left through the top since the stage began"},
+      {"water_drained_bottom", "m3", "water that left through the floor since the stage began"},
+      {"water_volume", "m3", "water in the bed, as much as it would be without excess pressure"},
+      {"water_balance", "m3", "water that the account leaves unexplained since the stage began"},
+      {"water_work", "J", "work of the water on grains and wall since the stage began"},
+      {"water_stored", "J", "energy of the compressed water"},
+      {"water_dissipated", "J", "dissipated by the flow of the water since the stage began"},
   };
   return list;
 }
@@ -75,12 +88,13 @@ struct Series::Impl {
   bool failed = false;
 };
 
-Series::Series(const std::filesystem::path& path, const std::vector<Row>& rows) {
+Series::Series(const std::filesystem::path& path, const std::vector<Row>& rows, bool with_water) {
+  const std::size_t count = with_water ? columns().size() : dry_columns;
   const hdf5::Lock lock;
   const std::filesystem::path aside = path.string() + ".tmp";
   std::error_code cause;
   try {
-    create(aside, rows);
+    create(aside, rows, count);
     std::filesystem::rename(aside, path, cause);
     if (cause) throw error(path.string(), ": cannot replace the file: ", cause.message());
   } catch (const Error&) {
@@ -88,7 +102,8 @@ Series::Series(const std::filesystem::path& path, const std::vector<Row>& rows) 
     throw;
   }
   impl_ = std::make_unique<Impl>(Impl{hdf5::File::open(path, H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE), {}, rows});
-  for (const Column& column : columns()) impl_->datasets.push_back(impl_->file.open_dataset(column.name));
+  for (std::size_t c = 0; c < count; ++c)
+    impl_->datasets.push_back(impl_->file.open_dataset(columns()[c].name));
 }
 
 // After a failed append the file is left as a kill would leave it, readable: closing it would declare it
@@ -131,6 +146,7 @@ std::vector<Row> read_series(const std::filesystem::path& path) {
   std::array<std::vector<double>, std::tuple_size_v<Numbers>> numbers;
   std::size_t rows = SIZE_MAX;
   for (std::size_t c = 0; c < numbers.size(); ++c) {
+    if (c == dry_columns && !file.holds(columns()[c].name)) break;
     file.read(columns()[c].name, numbers[c]);
     rows = std::min(rows, numbers[c].size());  // the last row may be on its way
   }
@@ -138,7 +154,7 @@ std::vector<Row> read_series(const std::filesystem::path& path) {
   for (std::size_t r = 0; r < rows; ++r) {
     Numbers row;
     std::transform(numbers.begin(), numbers.end(), row.begin(),
-                   [r](const auto& column) { return column[r]; });
+                   [r](const auto& column) { return r < column.size() ? column[r] : 0; });
     list.push_back(std::bit_cast<Row>(row));
   }
   return list;

@@ -58,6 +58,7 @@ void write_grains(const hdf5::Group& grains, const dem::Scene& scene, const dem:
   grains.write("spin", arrange(state.omega, rows), "rad/s");
   grains.write("rotation", arrange(state.rotation, rows), "rad");
   grains.write("force", arrange(state.force, rows), "N");  // by contacts; without gravity
+  if (!state.water_force.empty()) grains.write("water_force", arrange(state.water_force, rows), "N");
   grains.write("pressure", arrange(dem::grain_pressure(scene, state), rows), "Pa");
 }
 
@@ -88,6 +89,19 @@ std::int64_t write_contacts(const hdf5::Group& group, const dem::Scene& scene, c
   group.write("force", arrange(contacts, rows, [](const auto& c) { return c.f_n + c.f_t; }), "N");
   group.write("overlap", arrange(contacts, rows, &ContactForce::overlap), "m");
   return static_cast<std::int64_t>(contacts.size());
+}
+
+// By cell, x fastest.
+void write_water(const hdf5::Group& group, const coupling::WaterFields& water, SnapshotInfo& info) {
+  const auto& g = water.grid;
+  info.water_x = g.n[0], info.water_y = g.n[1], info.water_z = g.n[2];
+  info.water_size = {g.length[0], g.length[1], g.length[2]};
+  group.set("cells_x", info.water_x), group.set("cells_y", info.water_y), group.set("cells_z", info.water_z);
+  group.set("size", info.water_size);
+  group.write("pressure", water.pressure, "Pa");
+  group.write("porosity", water.porosity, "1");
+  group.write("permeability", water.permeability, "m2");
+  group.write("flux", water.flux, "m/s");
 }
 
 struct Field {
@@ -177,10 +191,50 @@ std::string xdmf(const Cloud& cloud, const std::vector<SnapshotInfo>& snapshots)
   return text.str();
 }
 
+// The cells of the water's grid; readers show nothing for a step without water.
+void write_water_grid(std::ostream& text, const SnapshotInfo& s) {
+  text << "<Grid Name=\"water\"><Time Value=\"" << shortest(s.time) << "\"/>\n"
+       << "<Topology TopologyType=\"3DCoRectMesh\" Dimensions=\"" << s.water_z + 1 << ' ' << s.water_y + 1
+       << ' ' << s.water_x + 1 << "\"/>\n<Geometry GeometryType=\"ORIGIN_DXDYDZ\">"
+       << "<DataItem Format=\"XML\" " << real << " Dimensions=\"3\">0 0 0</DataItem>"
+       << "<DataItem Format=\"XML\" " << real << " Dimensions=\"3\">"
+       << shortest(s.water_size.z / static_cast<double>(s.water_z)) << ' '
+       << shortest(s.water_size.y / static_cast<double>(s.water_y)) << ' '
+       << shortest(s.water_size.x / static_cast<double>(s.water_x)) << "</DataItem></Geometry>\n";
+  for (const Field& field :
+       {Field{"pressure", real}, {"porosity", real}, {"permeability", real}, {"flux", real, 3}}) {
+    text << "<Attribute Name=\"" << field.name << "\" Center=\"Cell\" AttributeType=\""
+         << (field.columns == 3 ? "Vector" : "Scalar") << "\"><DataItem Format=\"HDF\" " << field.number
+         << " Dimensions=\"" << s.water_z << ' ' << s.water_y << ' ' << s.water_x
+         << (field.columns == 3 ? " 3" : "") << "\">" << s.file << ":/water/" << field.name
+         << "</DataItem></Attribute>\n";
+  }
+  text << "</Grid>\n";
+}
+
+// Steps of a wet case: the grid alone, or (bed.xdmf) grains and grid side by side.
+std::string wet_xdmf(const std::vector<SnapshotInfo>& snapshots, bool with_grains) {
+  std::ostringstream text;
+  text << "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Xdmf Version=\"3.0\">\n<Domain>\n"
+       << "<Grid Name=\"steps\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
+  for (const SnapshotInfo& s : snapshots) {
+    if (s.water_x == 0) continue;
+    if (with_grains)
+      text << "<Grid Name=\"bed\" GridType=\"Collection\" CollectionType=\"Spatial\"><Time Value=\""
+           << shortest(s.time) << "\"/>\n";
+    if (with_grains) write_grid(text, clouds[0], s);
+    write_water_grid(text, s);
+    if (with_grains) text << "</Grid>\n";
+  }
+  text << "</Grid>\n</Domain>\n</Xdmf>\n";
+  return text.str();
+}
+
 }  // namespace
 
 SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::string& name, double time,
-                            const dem::Scene& scene, const dem::State& staggered) {
+                            const dem::Scene& scene, const dem::State& staggered,
+                            const std::optional<coupling::WaterFields>& water) {
   const hdf5::Lock lock;
   SnapshotInfo info{name + ".h5", time, staggered.size(), 0};
   const auto file = hdf5::File::in_memory(directory / info.file);
@@ -193,6 +247,7 @@ SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::s
   file.set("top_wall", staggered.wall_z);
   write_grains(file.create_group("grains"), scene, staggered);
   info.contacts = write_contacts(file.create_group("contacts"), scene, staggered);
+  if (water) write_water(file.create_group("water"), *water, info);
   file.save();
   return info;
 }
@@ -201,6 +256,10 @@ void write_xdmf(const std::filesystem::path& directory, const std::vector<Snapsh
   for (const Cloud& cloud : clouds) {
     write_text(directory / (std::string(cloud.group) + ".xdmf"), xdmf(cloud, snapshots));
   }
+  if (std::none_of(snapshots.begin(), snapshots.end(), [](const SnapshotInfo& s) { return s.water_x > 0; }))
+    return;
+  write_text(directory / "water.xdmf", wet_xdmf(snapshots, false));
+  write_text(directory / "bed.xdmf", wet_xdmf(snapshots, true));
 }
 
 }  // namespace moraine::output

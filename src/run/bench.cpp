@@ -3,6 +3,7 @@
 
 #include "error.hpp"
 #include "run/run.hpp"
+#include "run/schedule.hpp"
 #include "run/stages.hpp"
 
 namespace moraine::run {
@@ -16,10 +17,12 @@ void bench_case(const Options& options, const std::string& stage_name, std::int6
   }
   const Start start = start_of(c);
   dem::State state = start.state;
-  const Stage stage = prepare(c, index, start, state);
+  Stage stage = prepare(c, index, start, state);
+  const auto water = fill(stage, state, {}, false);
   const auto engine = dem::make_engine(options.backend, options.threads);
-  engine->load(stage.scene, state);
-  engine->advance(std::min<std::int64_t>(100, steps));  // warm caches and lists
+  engine->load(stage.scene, state, water.get());
+  steps = at_exchange(stage, steps);
+  engine->advance(at_exchange(stage, std::min<std::int64_t>(100, steps)));  // warm caches and lists
   const auto began = std::chrono::steady_clock::now();
   engine->advance(steps);
   const double ms =

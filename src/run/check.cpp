@@ -17,8 +17,9 @@ namespace moraine::run {
 namespace {
 
 // ms a step, from a few steps of the stage itself.
-double time_a_step(dem::Engine& engine, const dem::Scene& scene, const dem::State& state) {
-  engine.load(scene, state);
+double time_a_step(dem::Engine& engine, const dem::Scene& scene, const dem::State& state,
+                   dem::Surroundings* water) {
+  engine.load(scene, state, water);
   engine.advance(20);
   const auto began = std::chrono::steady_clock::now();
   std::int64_t steps = 0;
@@ -29,6 +30,48 @@ double time_a_step(dem::Engine& engine, const dem::Scene& scene, const dem::Stat
     seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   }
   return 1e3 * seconds / static_cast<double>(steps);
+}
+
+// Stiffness of the skeleton against uniaxial compression, Pa: contacts as linear springs, all of one length,
+// that follow the mean strain (M = K + 4/3 G; a real packing gives way to a half of that or less).
+double modulus(const cases::Case& c, const dem::State& s, double solid_fraction, double diameter) {
+  const double z = s.contacts.empty() ? 5 : 2.0 * static_cast<double>(s.contacts.size()) / s.size();
+  const double per_length = z * solid_fraction / (std::numbers::pi * diameter);
+  return per_length * (c.k_n / 3 + 4.0 / 3 * (2 * c.k_n + 3 * c.k_t) / 10);
+}
+
+void print_water(const cases::Case& c, const Stage& stage, const dem::State& s,
+                 const coupling::PoreWater& water, double height, double strain_rate) {
+  const coupling::Water& w = stage.water;
+  double volume = 0;
+  for (const double r : s.r) volume += dem::sphere_volume(r);
+  const double phi =
+      std::clamp(1 - volume / (stage.scene.area() * height), w.porosity_range[0], w.porosity_range[1]);
+  const double k = w.k_c * phi * phi * phi / ((1 - phi) * (1 - phi));
+  const double m = modulus(c, s, 1 - phi, stage.diameter), storage = phi * w.compressibility;
+  const double d = k / (w.viscosity * storage), c_v = k / (w.viscosity * (1 / m + storage));
+  const coupling::Stability stability = water.stability();
+  const double h = height / w.cells[2], interval = stage.scene.dt * static_cast<double>(water.interval());
+  std::printf("    %s\n", water.describe().c_str());
+  std::printf("    cells       %.3g d wide, %.3g d high\n", stage.scene.box.x / w.cells[0] / stage.diameter,
+              h / stage.diameter);
+  std::printf("    exchange    every %.4g s; stable up to %.4g s (contacts %.3g rad/s, water %.3g rad/s)\n",
+              interval, stability.longest_dt, stability.w_sk, stability.w_f);
+  std::printf(
+      "    water       k = %.3g m2 at porosity %.3g; D = k/(mu phi beta) = %.3g m2/s; diffusion number "
+      "%.3g\n",
+      k, phi, d, d * interval / (h * h));
+  std::printf("    skeleton    M about %.3g Pa; c_v = %.3g m2/s; R = K_f/(phi M) = %.3g; Skempton B = %.3g\n",
+              m, c_v, 1 / (storage * m), 1 / (1 + storage * m));
+  if (strain_rate != 0) {
+    const double ratio = std::abs(strain_rate) * height * height / c_v;
+    const double drop = 0.1 * std::abs(strain_rate) * height * height * w.viscosity / (2 * k);
+    std::printf("    dilation    strain rate x H^2/c_v = %.3g (%s); H^2/c_v = %.3g s\n", ratio,
+                ratio > 1 ? "faster than the water flows: undrained" : "slower than the water flows: drained",
+                height * height / c_v);
+    std::printf("                where the bed dilates by 0.1 of its shear, water falls by about %.3g Pa\n",
+                drop);
+  }
 }
 
 }  // namespace
@@ -69,7 +112,9 @@ void check_case(const Options& options) {
     if (k == 0) {
       dem::Scene timed = scene;  // with a step that the bed survives: how long one takes is the same
       timed.dt = std::min(scene.dt, 0.5 * critical_step(scene, s));
-      ms = time_a_step(*engine, timed, s);
+      auto timed_water = fill(stage, s, {}, false);
+      timed.exchange_interval = stage.scene.exchange_interval;
+      ms = time_a_step(*engine, timed, s, timed_water.get());
       std::printf("  backend       %s\n", engine->describe().c_str());
     }
     // Before the bed has settled its height is not known: from the volume of the grains.
@@ -102,6 +147,9 @@ void check_case(const Options& options) {
                     inertia > 1e-3 ? "  (above 1e-3: not pseudo-static)" : "");
       }
     }
+    if (const auto water = fill(stage, s, {}, false))
+      print_water(c, stage, s, *water, wanted.kind == cases::Stage::Kind::settle ? settled : stage.height_0,
+                  strain_rate);
     std::printf("    time        about %s at %.3g ms a step\n", readable_time(steps * ms / 1e3).c_str(), ms);
   }
   std::printf("  all           about %s, timed on the first stage's grains\n", readable_time(total).c_str());

@@ -128,7 +128,8 @@ void Guard::check_energy(const dem::State& s) {
   most_put_in_ = std::max(most_put_in_, energy_put_in({first_, now}));
   // Rounding of the potential energy may exceed what a bed at rest has stored.
   const double had = stored(first_) + most_put_in_ + 1e-10 * std::abs(first_.potential);
-  const double gained = stored(now) + now.potential - energy_0 - now.top_wall_work - now.layers_work;
+  const double gained =
+      stored(now) + now.potential - energy_0 - now.top_wall_work - now.layers_work - now.water_work;
   const bool ledger = stage_.scene.ledger;
   // Damping that pushes is creation of energy too, though the ledger balances.
   const double negative = ledger ? std::max(0.0, -now.viscous) + std::max(0.0, -now.slip) : 0;

@@ -94,6 +94,17 @@ void check_margin(const Stage& stage, const dem::State& s, std::vector<std::stri
                             " m, or 0 for an automatic one"));
 }
 
+void check_cells(const Stage& stage, std::vector<std::string>& warnings) {
+  if (!stage.water.present) return;
+  const bool wall = stage.scene.top_wall.drive != dem::TopWall::Drive::none;
+  const double length[3] = {stage.scene.box.x, stage.scene.box.y, wall ? stage.height_0 : stage.water.height};
+  for (int a = 0; a < 3; ++a)
+    if (const double h = length[a] / stage.water.cells[a]; h < 2 * stage.diameter)
+      warnings.push_back(text(
+          "stage ", stage.name, ": grid cells of ", h, " m along ", "xyz"[a], " are ", h / stage.diameter,
+          " mean diameters wide and measure pores rather than porosity; expected 2 to 3"));
+}
+
 void check_overlaps(const cases::Case& c, const dem::Scene& scene, const dem::State& s) {
   const Overlap o = deepest_overlap(scene, s);
   if (o.fraction <= c.guards.max_overlap) return;
@@ -109,11 +120,14 @@ std::vector<std::string> precheck(const cases::Case& c, const Start& start, dem:
   std::vector<std::string> warnings;
   for (std::size_t k = 0; k < c.stages.size(); ++k) {
     dem::State s = start.state;
-    const Stage stage = prepare(c, k, start, s);
+    Stage stage = prepare(c, k, start, s);
     check_step(stage, s, warnings);
     check_margin(stage, s, warnings);
+    check_cells(stage, warnings);
+    std::unique_ptr<coupling::PoreWater> water;  // refuses what is impossible
+    if (k == 0 || !c.start.empty()) water = fill(stage, s, {}, false);
     if (k > 0) continue;
-    engine.load(stage.scene, s);
+    engine.load(stage.scene, s, water.get());
     check_overlaps(c, stage.scene, engine.state());
   }
   return warnings;

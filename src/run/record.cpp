@@ -52,10 +52,24 @@ output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, d
   row.kinetic = e.kinetic, row.rotational = e.rotational;
   row.elastic_normal = e.elastic_normal, row.elastic_tangential = e.elastic_tangential;
   row.potential = e.potential, row.wall_kinetic = e.wall_kinetic;
+  row.water_work = l.water;
   row.slip = l.slip, row.viscous = l.viscous, row.top_wall_work = l.top_wall, row.layers_work = l.layers;
-  row.residue = stage.scene.ledger ? (e.total() - energy_0) + l.slip + l.viscous - l.top_wall - l.layers
-                                   : std::numeric_limits<double>::quiet_NaN();
+  row.residue = stage.scene.ledger
+                    ? (e.total() - energy_0) + l.slip + l.viscous - l.top_wall - l.layers - l.water
+                    : std::numeric_limits<double>::quiet_NaN();
   return row;
+}
+
+void add_water(output::Row& row, const Stage& stage, const coupling::PoreWater& water) {
+  // A sheared bed deforms in its upper half.
+  const coupling::WaterRecord r = water.record(shears(stage.kind) ? 0.5 * row.height : 0);
+  const coupling::WaterState s = water.state();
+  row.wall_water_pressure = s.wall_pressure;
+  row.total_friction = row.shear_stress / (row.normal_stress + s.wall_pressure);
+  row.water_pressure_mean = r.mean, row.water_pressure_min = r.least, row.water_pressure_max = r.most;
+  row.water_drained_top = s.drained_top, row.water_drained_bottom = s.drained_bottom;
+  row.water_volume = r.volume, row.water_balance = r.balance;
+  row.water_stored = r.stored, row.water_dissipated = s.dissipated;
 }
 
 Strength strength_of(const std::vector<output::Row>& rows) {
@@ -88,7 +102,7 @@ std::optional<Strength> final_strength(const std::vector<cases::Stage>& stages,
 double energy_put_in(const std::vector<output::Row>& rows) {
   const output::Row& last = rows.back();
   return std::max(0.0, last.top_wall_work) + std::max(0.0, last.layers_work) +
-         std::max(0.0, rows.front().potential - last.potential);
+         std::max(0.0, last.water_work) + std::max(0.0, rows.front().potential - last.potential);
 }
 
 std::string summary(const std::vector<cases::Stage>& stages, const std::vector<output::Row>& rows) {

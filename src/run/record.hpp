@@ -10,6 +10,9 @@
 namespace moraine::run {
 
 // energy_0: the total when the stage began, J; time_0: s, when the stage began.
+// What pore water adds to a row.
+void add_water(output::Row& row, const Stage& stage, const coupling::PoreWater& water);
+
 output::Row row_of(std::size_t index, const Stage& stage, const dem::State& state, double time_0,
                    double energy_0);
 

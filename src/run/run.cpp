@@ -103,7 +103,7 @@ class Runner {
     progress_->say((resuming ? "resumed: " : "") + case_.title + ": " + std::to_string(start_.state.size()) +
                    " grains, " + engine_->describe());
     for (const std::string& w : warnings_) progress_->say("warning: " + w);
-    series_ = std::make_unique<output::Series>(files_.series(), now_.rows);
+    series_ = std::make_unique<output::Series>(files_.series(), now_.rows, case_.has_water());
 
     for (auto k = static_cast<std::size_t>(now_.stage); k < case_.stages.size(); ++k)
       run_stage(k, resuming), resuming = false;
@@ -119,13 +119,15 @@ class Runner {
     Stage stage;
     if (resuming) {
       stage = describe(case_, index, now_.scene, now_.height_0, now_.state);
-      engine_->load(stage.scene, now_.state);
+      water_ = fill(stage, now_.state, now_.water, /*restart=*/true);
+      engine_->load(stage.scene, now_.state, water_.get());
     } else {
       if (!now_.rows.empty()) now_.stage_start_time = now_.rows.back().time;
       dem::synchronise(now_.scene, now_.state);
       stage = prepare(case_, index, start_, now_.state);
-      engine_->load(stage.scene, now_.state);
-      now_.state = engine_->state();
+      water_ = fill(stage, now_.state, now_.water, /*restart=*/false);
+      engine_->load(stage.scene, now_.state, water_.get());
+      take_state();
       now_.scene = stage.scene, now_.height_0 = stage.height_0;
       if (case_.automatic_dt) {
         now_.critical_at = -steps_between_estimates;
@@ -143,16 +145,19 @@ class Runner {
                   static_cast<long long>(steps), stage.scene.dt,
                   case_.automatic_dt ? ", which follows the bed" : "");
     progress_->say(text);
+    if (water_) progress_->say(water_->describe());
     progress_->begin(stage.name, step, steps, 0);
 
     Guard guard(case_.guards, stage, now_.rows);
     std::int64_t slice = 64;  // steps between looks at the clock
     for (bool ended = stage.scene.time(step) > stage.duration - 0.5 * stage.scene.dt; !ended;) {
-      const Event event = next_event(stage, step);
-      const std::int64_t look = (step / guard.every() + 1) * guard.every();
+      Event event = next_event(stage, step);
+      event.step = at_exchange(stage, event.step);
+      const std::int64_t look = at_exchange(stage, (step / guard.every() + 1) * guard.every());
       std::int64_t until = std::min({event.step, look, step + slice});
       const std::int64_t estimate = now_.critical_at + steps_between_estimates;
       if (case_.automatic_dt) until = std::min(until, estimate);
+      until = at_exchange(stage, until);
       const auto began = std::chrono::steady_clock::now();
       engine_->advance(until - step);
       const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
@@ -160,7 +165,10 @@ class Runner {
       step = until;
       const bool due = step == event.step;
       ended = due && event.end;
-      if (due || step == look) guard.check(now_.state = engine_->state());
+      if (due || step == look) {
+        take_state();
+        guard.check(now_.state);
+      }
       if (due) {
         if (event.series) record(stage);
         if (event.snapshot) snapshot(stage);
@@ -170,7 +178,7 @@ class Runner {
       progress_->show({step, stage.scene.time(step), now_.rows.back().unbalanced_force});
       const bool stop = stop_requested;
       if (stop || ended || seconds_since_save() > case_.output.checkpoint_interval) {
-        if (!due) now_.state = engine_->state();
+        if (!due) take_state();
         if (due || guard.finds_healthy(now_.state)) save();
       }
       if (stop)
@@ -180,7 +188,7 @@ class Runner {
 
   // The time step from here on.
   void follow_bed(Stage& stage) {
-    now_.state = engine_->state();
+    take_state();
     if (now_.state.step == now_.critical_at + steps_between_estimates) {
       now_.critical_step = critical_step(stage.scene, now_.state);
       now_.critical_at = now_.state.step;
@@ -193,6 +201,7 @@ class Runner {
   void record(const Stage& stage) {
     now_.rows.push_back(row_of(static_cast<std::size_t>(now_.stage), stage, now_.state, now_.stage_start_time,
                                now_.energy_0));
+    if (water_) add_water(now_.rows.back(), stage, *water_);
     series_->append(now_.rows.back());
   }
 
@@ -201,9 +210,15 @@ class Runner {
     std::snprintf(name, sizeof name, "%02d-%s-%06lld", static_cast<int>(now_.stage) + 1, stage.name.c_str(),
                   static_cast<long long>(std::ceil(
                       (stage.scene.time(now_.state.step) - 0.5 * stage.scene.dt) / stage.snapshot_interval)));
-    now_.snapshots.push_back(
-        output::write_snapshot(files_.snapshots(), name, now_.rows.back().time, stage.scene, now_.state));
+    now_.snapshots.push_back(output::write_snapshot(files_.snapshots(), name, now_.rows.back().time,
+                                                    stage.scene, now_.state,
+                                                    water_ ? std::optional(water_->fields()) : std::nullopt));
     output::write_xdmf(files_.snapshots(), now_.snapshots);
+  }
+
+  void take_state() {
+    now_.state = engine_->state();
+    if (water_) now_.water = water_->state();
   }
 
   void save() {
@@ -219,6 +234,7 @@ class Runner {
   Files files_;
   Start start_;
   output::Checkpoint now_;
+  std::unique_ptr<coupling::PoreWater> water_;  // of the present stage
   std::unique_ptr<dem::Engine> engine_;
   std::unique_ptr<Progress> progress_;
   std::vector<std::string> warnings_;

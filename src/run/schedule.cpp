@@ -34,6 +34,11 @@ Event next_event(const Stage& stage, std::int64_t step) {
           end || at == step_at(scene, snapshot), end};
 }
 
+std::int64_t at_exchange(const Stage& stage, std::int64_t step) {
+  const std::int64_t m = std::max<std::int64_t>(1, stage.scene.exchange_interval);
+  return (step + m - 1) / m * m;
+}
+
 double critical_step(const dem::Scene& scene, const dem::State& state) {
   return std::min(dem::critical_step(dem::spectrum(scene, state)), dem::one_contact_step(scene, state));
 }

@@ -19,6 +19,9 @@ struct Event {
 };
 Event next_event(const Stage& stage, std::int64_t step);
 
+// The same or the first later step at which grains meet pore water: only there is the state whole.
+std::int64_t at_exchange(const Stage& stage, std::int64_t step);
+
 double critical_step(const dem::Scene& scene, const dem::State& state);  // s
 
 // Sets the step from here on: the longest up to `longest` that meets the next event.

@@ -111,12 +111,55 @@ Start start_of(const cases::Case& c) {
   return {std::move(lattice.state), lattice.box_x, lattice.box_y, c.box_z, wall_mass};
 }
 
+namespace {
+
+coupling::Water water_of(const cases::Case& c, const cases::Stage& stage, const dem::Scene& scene,
+                         double height, double diameter) {
+  coupling::Water w;
+  w.present = stage.fluid;
+  if (!w.present) return w;
+  const cases::Fluid& f = c.fluid;
+  w.viscosity = f.viscosity, w.compressibility = f.compressibility, w.density = f.density;
+  w.k_c = f.permeability_factor > 0 ? f.permeability_factor : diameter * diameter / 180;
+  w.porosity_range = {f.porosity_min, f.porosity_max};
+  w.height = f.height > 0 ? f.height : height + f.cell * diameter;
+  const bool wall = scene.top_wall.drive != dem::TopWall::Drive::none;
+  const double length[3] = {scene.box.x, scene.box.y, wall ? height : w.height};
+  const std::int64_t wanted[3] = {f.cells_x, f.cells_y, f.cells_z};
+  for (int a = 0; a < 3; ++a)
+    w.cells[a] = static_cast<int>(
+        wanted[a] > 0 ? wanted[a] : std::max<std::int64_t>(1, std::int64_t(length[a] / (f.cell * diameter))));
+  using Kind = fluid::Side::Kind;
+  w.top = coupling::TopSide(int(stage.fluid_top));
+  if (w.top == coupling::TopSide::drained)
+    w.sides.high[2] = {Kind::pressure, stage.top_pressure, stage.top_pressure_amplitude,
+                       stage.top_pressure_frequency, stage.top_pressure_phase};
+  if (stage.fluid_bottom == cases::Stage::FluidBottom::pressure)
+    w.sides.low[2] = {Kind::pressure, stage.bottom_pressure};
+  if (stage.fluid_bottom == cases::Stage::FluidBottom::flux) w.sides.low[2] = {Kind::flux, stage.bottom_flux};
+  w.closure = coupling::Closure(int(f.closure));
+  w.interval = f.exchange_interval;
+  w.solver = coupling::Solver(int(f.solver)), w.tolerance = f.tolerance;
+  return w;
+}
+
+}  // namespace
+
+std::unique_ptr<coupling::PoreWater> fill(Stage& stage, const dem::State& grains,
+                                          const coupling::WaterState& before, bool restart) {
+  if (!stage.water.present) return nullptr;
+  auto water = coupling::make_pore_water(stage.water, stage.scene, grains, before, restart);
+  stage.scene.exchange_interval = water->interval();
+  return water;
+}
+
 Stage describe(const cases::Case& c, std::size_t index, const dem::Scene& scene, double height_0,
                const dem::State& state) {
   const cases::Stage& stage = c.stages.at(index);
   Stage out;
   out.name = stage.name, out.kind = stage.kind, out.scene = scene, out.height_0 = height_0;
   out.diameter = mean_diameter(state);
+  out.water = water_of(c, stage, scene, height_0, out.diameter);
   out.strain_rate = shears(stage.kind) ? scene.shear.velocity / height_0 : stage.strain_rate;
   out.duration = stage.duration > 0 ? stage.duration : stage.strain / std::abs(out.strain_rate);
   out.series_interval = c.output.series_interval, out.snapshot_interval = c.output.snapshot_interval;
@@ -132,6 +175,7 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, dem::
   scene.grain = {c.k_n, c.k_t, stage.gamma_n, stage.gamma_t, stage.mu_s, stage.mu_d};
   scene.wall = {c.k_n, c.wall_k_t, stage.wall_gamma_n, stage.wall_gamma_t, stage.wall_mu, stage.wall_mu};
   scene.neighbour_margin = c.neighbour_margin, scene.ledger = c.ledger;
+  scene.fluid_density = stage.fluid ? c.fluid.density : 0;
 
   if (stage.zero_kinematics) {
     for (auto* v : {&s.v, &s.omega, &s.rotation}) std::fill(v->begin(), v->end(), dem::Vec3d{0, 0, 0});
@@ -155,6 +199,7 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, dem::
     s.layer_u = 0;
   }
   s.step = 0, s.staggered = false, s.ledger = {};
+  s.water_force.clear(), s.water = {};
   dem::sort_spatially(scene, s);
   scene.dt = c.automatic_dt ? c.safety * critical_step(scene, s)
              : c.dt > 0     ? c.dt

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "case/case.hpp"
+#include "coupling/pore_water.hpp"
 #include "dem/scene.hpp"
 #include "dem/state.hpp"
 
@@ -21,6 +22,7 @@ struct Stage {
   std::string name;
   cases::Stage::Kind kind;
   dem::Scene scene;
+  coupling::Water water;
   double duration;                            // s
   double series_interval, snapshot_interval;  // s
   double height_0;                            // m
@@ -34,6 +36,11 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, dem::
 // The same without touching a state that is under way already (after a restart).
 Stage describe(const cases::Case& c, std::size_t index, const dem::Scene& scene, double height_0,
                const dem::State& state);
+
+// The pore water of a stage, null where it is dry; and the exchange interval that it sets. restart: go on
+// with the same bits. Throws Error where that is impossible (coupling/pore_water.hpp).
+std::unique_ptr<coupling::PoreWater> fill(Stage& stage, const dem::State& grains,
+                                          const coupling::WaterState& before, bool restart);
 
 double mean_diameter(const dem::State& s);                                    // m
 double step_by_eq_9(const dem::Scene& scene, const dem::State& s, double f);  // s
