@@ -193,7 +193,7 @@ void Mapping::build(const fluid::Grid& grid, const std::array<bool, 3>& open_low
           const Index i = order[k];
           if (lane % 4 == 0) {
             Lane4& fresh = a.packs.emplace_back();
-            fresh.b.fill(Pack(0.0)), fresh.last = Pack(0.0), fresh.grain.fill(i);
+            fresh.b.fill({0, 0, 0, 0}), fresh.grain.fill(i);
           }
           Lane4& pack = a.packs.back();
           pack.grain[lane % 4] = i;
@@ -201,8 +201,8 @@ void Mapping::build(const fluid::Grid& grid, const std::array<bool, 3>& open_low
             const Index f = bin.face[e];
             const double b = scale[f] * dem::sphere_volume(grains[i].r) * stencils[i].w[e] *
                              (1 + dot(slope[f], stencils[i].xi[e]));
-            pack.b[e].v[lane % 4] = b;
-            if (top_layer[i]) layer_[axis][f] += b;
+            pack.b[e][lane % 4] = static_cast<float>(b);
+            if (top_layer[i]) layer_[axis][f] += pack.b[e][lane % 4];
           }
         }
         bin.packs = static_cast<Index>(a.packs.size()) - bin.first;
@@ -217,21 +217,36 @@ void Mapping::build(const fluid::Grid& grid, const std::array<bool, 3>& open_low
 
 void Mapping::start_from(const std::vector<Vec3d>& x) {
   for (Chunk& chunk : chunks_)
-    for (int axis = 0; axis < 3; ++axis)
-      for (Lane4& pack : chunk.axis[axis].packs)
-        for (int k = 0; k < 4; ++k) pack.last.v[k] = x[pack.grain[k]][axis];
+    for (int axis = 0; axis < 3; ++axis) {
+      Axis& a = chunk.axis[axis];
+      a.last.resize(a.packs.size());
+      for (std::size_t p = 0; p < a.packs.size(); ++p)
+        for (int k = 0; k < 4; ++k) a.last[p].v[k] = x[a.packs[p].grain[k]][axis];
+    }
 }
 
 std::vector<Vec3d> Mapping::last() const {
   std::vector<Vec3d> x(n_);
   for (const Chunk& chunk : chunks_)
-    for (int axis = 0; axis < 3; ++axis)
-      for (const Lane4& pack : chunk.axis[axis].packs)
-        for (int k = 0; k < 4; ++k) x[pack.grain[k]][axis] = pack.last[k];
+    for (int axis = 0; axis < 3; ++axis) {
+      const Axis& a = chunk.axis[axis];
+      for (std::size_t p = 0; p < a.packs.size(); ++p)
+        for (int k = 0; k < 4; ++k) x[a.packs[p].grain[k]][axis] = a.last[p][k];
+    }
   return x;
 }
 
-void Mapping::displace(Index c, const dem::GrainRow* grains) {
+Pack Mapping::Lane4::weight(int e) const {
+#if defined(__AVX__)
+  return _mm256_cvtps_pd(_mm_loadu_ps(b[e].data()));
+#else
+  return {b[e][0], b[e][1], b[e][2], b[e][3]};
+#endif
+}
+
+// displacement(axis, list of the axis, number of the pack): Pack, m.
+template <class Displacement>
+void Mapping::add_up(Index c, Displacement&& displacement) {
   Chunk& chunk = chunks_[c];
   Pack most(0.0);
   for (int axis = 0; axis < 3; ++axis) {
@@ -241,13 +256,9 @@ void Mapping::displace(Index c, const dem::GrainRow* grains) {
       std::array<Pack, 8> sum;
       sum.fill(Pack(0.0));
       for (Index p = bin.first; p < bin.first + bin.packs; ++p) {
-        Lane4& pack = a.packs[p];
-        const Pack x(grains[pack.grain[0]].x[axis], grains[pack.grain[1]].x[axis],
-                     grains[pack.grain[2]].x[axis], grains[pack.grain[3]].x[axis]);
-        const Pack d = x - pack.last;
-        pack.last = x;
+        const Pack d = displacement(axis, a, p);
         most = max(max(d, -d), most);
-        for (int e = 0; e < 8; ++e) sum[e] = fma(pack.b[e], d, sum[e]);
+        for (int e = 0; e < 8; ++e) sum[e] = fma(a.packs[p].weight(e), d, sum[e]);
       }
       for (int e = 0; e < 8; e += 4) {
         transpose(sum[e], sum[e + 1], sum[e + 2], sum[e + 3]);
@@ -257,6 +268,24 @@ void Mapping::displace(Index c, const dem::GrainRow* grains) {
     }
   }
   chunk.moved = std::max({most[0], most[1], most[2], most[3]});
+}
+
+void Mapping::displace(Index c, const dem::GrainRow* grains) {
+  add_up(c, [grains](int axis, Axis& a, Index p) {
+    const std::array<Index, 4>& i = a.packs[p].grain;
+    const Pack x(grains[i[0]].x[axis], grains[i[1]].x[axis], grains[i[2]].x[axis], grains[i[3]].x[axis]);
+    const Pack d = x - a.last[p];
+    a.last[p] = x;
+    return d;
+  });
+}
+
+void Mapping::displace(Index c, const dem::GrainRow* grains, double dt) {
+  add_up(c, [grains, dt](int axis, const Axis& a, Index p) {
+    const std::array<Index, 4>& i = a.packs[p].grain;
+    return Pack(dt) *
+           Pack(grains[i[0]].v[axis], grains[i[1]].v[axis], grains[i[2]].v[axis], grains[i[3]].v[axis]);
+  });
 }
 
 double Mapping::collect(Faces& u) const {
@@ -283,9 +312,9 @@ void Mapping::push(Index c, const Faces& g, dem::WaterRow* force) const {
       for (int e = 0; e < 8; ++e) at[e] = Pack(of[bin.face[e]]);
       for (Index p = bin.first; p < bin.first + bin.packs; ++p) {
         const Lane4& pack = a.packs[p];
-        Pack f = pack.b[0] * at[0], rest = pack.b[1] * at[1];
+        Pack f = pack.weight(0) * at[0], rest = pack.weight(1) * at[1];
         for (int e = 2; e < 8; e += 2)
-          f = fma(pack.b[e], at[e], f), rest = fma(pack.b[e + 1], at[e + 1], rest);
+          f = fma(pack.weight(e), at[e], f), rest = fma(pack.weight(e + 1), at[e + 1], rest);
         f += rest;
         const int lanes = p + 1 < bin.first + bin.packs ? 4 : bin.in_last;
         for (int k = 0; k < lanes; ++k) force[pack.grain[k]].f[axis] = f[k];

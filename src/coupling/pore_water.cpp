@@ -51,6 +51,7 @@ class GridWater final : public PoreWater {
       t_ = scene.time(s.step);
       gradients(t_);
       stale_ = now_.moved > map_lasts * least_cell();
+      under_way_ = true;
     } else {
       map(s.x);
       now_.wall_z = s.wall_z;
@@ -71,7 +72,12 @@ class GridWater final : public PoreWater {
     mapping_.start_from(last);
   }
 
-  void displace(dem::Index chunk, const dem::GrainRow* grains) override { mapping_.displace(chunk, grains); }
+  void displace(dem::Index chunk, const dem::GrainRow* grains) override {
+    if (interval_ > 1)
+      mapping_.displace(chunk, grains);
+    else  // the step that led here, if one did
+      mapping_.displace(chunk, grains, under_way_ ? scene_.dt : 0);
+  }
 
   dem::WaterReaction solve(const dem::Drive& drive, double t) override {
     const double moved = mapping_.collect(u_);
@@ -85,7 +91,9 @@ class GridWater final : public PoreWater {
     std::swap(g_, before_);
     if (g_[0].size() != before_[0].size()) g_ = before_;
     const double wall_before = now_.wall_pressure;
-    if (const double dt = t - t_; dt > 0) {
+    if (t > t_) {
+      // Not t - t_, whose last bits change from step to step: a factor of the matrix belongs to one step.
+      const double dt = static_cast<double>(interval_) * scene_.dt;
       double out_top = 0;
       for (std::size_t f = grid_.face(2, 0, 0, nz); f < u_[2].size(); ++f) out_top += u_[2][f];
       const fluid::Exchanged in = step_.step(t, dt, div_u_, now_.q, now_.p);
@@ -122,6 +130,7 @@ class GridWater final : public PoreWater {
     now_.moved += moved + std::abs(wall_dz);
     stale_ = now_.moved > map_lasts * least_cell();
     ++now_.exchanges;
+    under_way_ = true;
     return out;
   }
 
@@ -165,6 +174,17 @@ class GridWater final : public PoreWater {
     return r;
   }
 
+  std::string solver() const override {
+    const fluid::PressureStep::Report r = step_.report();
+    std::ostringstream out;
+    out.precision(3);
+    out << r.solver;
+    if (r.iterations > 0) out << ": " << double(r.iterations) / double(r.solves) << " iterations a solve";
+    if (r.factorisations > 0)
+      out << ", " << r.factorisations << " factorisations in " << r.solves << " solves";
+    return out.str();
+  }
+
   std::string describe() const override {
     double d = 0;
     for (const double v : volume_) d += 2 * std::cbrt(v * 3 / (4 * std::numbers::pi));
@@ -178,7 +198,7 @@ class GridWater final : public PoreWater {
       out << "step";
     else
       out << interval_ << " steps";
-    out << " (at most " << stability_.longest << "), " << step_.report().solver;
+    out << " (at most " << stability_.longest << ")";
     return out.str();
   }
 
@@ -416,6 +436,7 @@ class GridWater final : public PoreWater {
   fluid::Medium medium_;
   Mapping mapping_;
   bool closed_ = false, stale_ = false;
+  bool under_way_ = false;  // grains have moved since the weights were first made, or will have
   std::vector<Vec3d> x_;
   std::vector<double> volume_;  // m3, of each grain
   std::vector<bool> top_layer_;

@@ -105,6 +105,22 @@ Owned<SUNContext, FreeContext> make_context() {
   return Owned<SUNContext, FreeContext>(context);
 }
 
+Owned<N_Vector, FreeVector> make_vector(std::size_t n, SUNContext context) {
+  Owned<N_Vector, FreeVector> v(N_VNew_Serial(static_cast<sunindextype>(n), context));
+  if (!v) throw error("pore water: no memory for ", n, " cells");
+  v->ops->nvdotprod = [](N_Vector a, N_Vector b) {
+    const double *const x = NV_DATA_S(a), *const y = NV_DATA_S(b);
+    const sunindextype size = NV_LENGTH_S(a);
+    double sum[8] = {};
+    sunindextype k = 0;
+    for (; k + 8 <= size; k += 8)
+      for (int lane = 0; lane < 8; ++lane) sum[lane] += x[k + lane] * y[k + lane];
+    for (int lane = 0; k < size; ++k, ++lane) sum[lane] += x[k] * y[k];
+    return ((sum[0] + sum[4]) + (sum[1] + sum[5])) + ((sum[2] + sum[6]) + (sum[3] + sum[7]));
+  };
+  return v;
+}
+
 Owned<SUNLinearSolver, FreeSolver> make_cholmod(const System& system, SUNContext context) {
   SUNLinearSolver s = SUNLinSolNewEmpty(context);
   s->content = new Cholmod(system);

@@ -23,8 +23,7 @@ constexpr std::size_t small_grid = 10000;
 struct PressureStep::Impl {
   Impl(const Grid& grid, const Sides& sides, const SolverOptions& o)
       : darcy(grid, sides), options(o), context(make_context()) {
-    const auto n = static_cast<sunindextype>(grid.cells());
-    x.reset(N_VNew_Serial(n, context.get())), b.reset(N_VNew_Serial(n, context.get()));
+    x = make_vector(grid.cells(), context.get()), b = make_vector(grid.cells(), context.get());
     system.darcy = &darcy;
     pcg = make_pcg(system, x.get(), options.max_iterations, context.get());
     change.resize(grid.cells());

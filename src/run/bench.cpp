@@ -33,11 +33,11 @@ void bench_case(const Options& options, const std::string& stage_name, std::int6
       "{\"program\": \"moraine %s\", \"backend\": \"%s\", \"threads\": %d, \"stage\": \"%s\", \"steps\": "
       "%lld, "
       "\"grains\": %d, \"contacts\": %zu, \"pairs\": %lld, \"near_pairs\": %lld, \"ms_per_step\": %.6g, "
-      "\"particle_steps_per_s\": %.6g}\n",
+      "\"particle_steps_per_s\": %.6g%s}\n",
       MORAINE_VERSION, engine->describe().c_str(), engine->threads(), stage.name.c_str(),
       static_cast<long long>(steps), end.size(), end.contacts.size(),
       static_cast<long long>(counts.candidates), static_cast<long long>(counts.near), ms,
-      end.size() / ms * 1e3);
+      end.size() / ms * 1e3, (water ? ", \"water\": \"" + water->solver() + "\"" : std::string()).c_str());
 }
 
 }  // namespace moraine::run

@@ -176,6 +176,7 @@ class Runner {
       if (case_.automatic_dt && !ended && (due || step == estimate)) follow_bed(stage);
       if (options_.on_progress) options_.on_progress(index, step, std::max<std::int64_t>(step, steps));
       progress_->show({step, stage.scene.time(step), now_.rows.back().unbalanced_force});
+      if (ended && water_) progress_->say("water, " + water_->solver());
       const bool stop = stop_requested;
       if (stop || ended || seconds_since_save() > case_.output.checkpoint_interval) {
         if (!due) take_state();
