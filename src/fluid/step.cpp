@@ -1,0 +1,68 @@
+#include "fluid/step.hpp"
+
+#include <algorithm>
+
+#include "error.hpp"
+#include "fluid/darcy.hpp"
+#include "fluid/linear_solver.hpp"
+
+namespace moraine::fluid {
+
+struct PressureStep::Impl {
+  Darcy darcy;
+  LinearSolver solver;
+  std::vector<double> rhs, pressure, out;
+
+  Impl(const Grid& grid, const Sides& sides, const SolverOptions& options)
+      : darcy(grid, sides), solver(darcy, options) {
+    for (auto* v : {&rhs, &pressure, &out}) v->assign(grid.cells(), 0);
+  }
+};
+
+PressureStep::PressureStep(const Grid& grid, const Sides& sides, const SolverOptions& options)
+    : impl_(std::make_unique<Impl>(grid, sides, options)) {}
+PressureStep::~PressureStep() = default;
+PressureStep::PressureStep(PressureStep&&) noexcept = default;
+PressureStep& PressureStep::operator=(PressureStep&&) noexcept = default;
+
+void PressureStep::set(const Grid& grid, const Medium& medium) { impl_->darcy.set(grid, medium); }
+
+Exchanged PressureStep::step(double t, double dt, const std::vector<double>& div_u, std::vector<double>& q,
+                             std::vector<double>& p) {
+  Impl& m = *impl_;
+  const std::size_t n = m.rhs.size();
+  if (m.darcy.version() == 0) throw error("pore water: a step before porosity and permeability were set");
+  if (div_u.size() != n || q.size() != n || p.size() != n)
+    throw error("pore water: ", div_u.size(), " volume changes, ", q.size(), " volumes and ", p.size(),
+                " pressures; expected ", n, " of each");
+  if (!(dt > 0)) throw error("pore water: a step of ", dt, " s; expected a positive one");
+  for (std::size_t c = 0; c < n; ++c) m.rhs[c] = q[c] - div_u[c];
+  m.darcy.add_sides(dt, t, m.rhs.data());
+  std::copy(p.begin(), p.end(), m.pressure.begin());
+  m.solver.solve(dt, m.rhs.data(), m.pressure.data());
+
+  p = m.pressure;
+  m.darcy.outflow(t, p.data(), m.out.data());
+  for (std::size_t c = 0; c < n; ++c) q[c] = (q[c] - div_u[c]) - dt * m.out[c];
+  Exchanged volume = m.darcy.inflow(t, p.data());
+  for (int a = 0; a < 3; ++a) volume.low[a] *= dt, volume.high[a] *= dt;
+  return volume;
+}
+
+const std::vector<double>& PressureStep::storage() const { return impl_->darcy.storage(); }
+const std::vector<double>& PressureStep::transmissibility(int axis) const {
+  return impl_->darcy.transmissibility(axis);
+}
+void PressureStep::flux(int axis, double t, const std::vector<double>& p, std::vector<double>& out) const {
+  out.resize(impl_->darcy.grid().face_count(axis));
+  impl_->darcy.flux(axis, t, p.data(), out.data());
+}
+double PressureStep::dissipation(double t, const std::vector<double>& p) const {
+  return impl_->darcy.dissipation(t, p.data());
+}
+PressureStep::Report PressureStep::report() const {
+  const LinearSolver& s = impl_->solver;
+  return {name(s.method()), s.solves(), s.iterations(), s.factorisations()};
+}
+
+}  // namespace moraine::fluid
