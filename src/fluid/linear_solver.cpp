@@ -1,7 +1,6 @@
 #include "fluid/linear_solver.hpp"
 
 #include <cholmod.h>
-#include <nvector/nvector_serial.h>
 #include <sunlinsol/sunlinsol_pcg.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <limits>
 
 #include "error.hpp"
+#include "fluid/vector.hpp"
 
 namespace moraine::fluid {
 
@@ -142,11 +142,7 @@ int free_cholmod(SUNLinearSolver solver) {
   return SUNLS_SUCCESS;
 }
 
-double norm(const double* v, std::size_t n) {
-  double sum = 0;
-  for (std::size_t i = 0; i < n; ++i) sum += v[i] * v[i];
-  return std::sqrt(sum);
-}
+double norm(const double* v, std::size_t n) { return std::sqrt(dot(v, v, n)); }
 
 }  // namespace
 
@@ -196,10 +192,10 @@ struct LinearSolver::Impl {
     inverse_diagonal.assign(n, 0), residual.assign(n, 0), correction.assign(n, 0);
     SUNContext_Create(nullptr, &context);
     b = N_VNewEmpty_Serial(static_cast<sunindextype>(n), context);
-    x = N_VNew_Serial(static_cast<sunindextype>(n), context);
+    x = new_vector(n, context);
     pcg = SUNLinSol_PCG(x, SUN_PREC_LEFT, o.max_iterations, context);
     direct = make_cholmod_solver(cholmod, context);
-    if (!b || !x || !pcg) throw error("pore water: no memory for the linear solver of ", n, " cells");
+    if (!b || !pcg) throw error("pore water: no memory for the linear solver of ", n, " cells");
     SUNLinSolSetATimes(pcg, this, multiply);
     SUNLinSolSetPreconditioner(pcg, this, nullptr, precondition);
     SUNLinSolInitialize(pcg);
