@@ -1,10 +1,14 @@
-// The Darcy operator on a grid: transmissibilities T = A k_f/(mu_f l) between cells and towards open sides,
-// and the storage C = beta phi V of each cell.
+// Darcy flow between the cells of a grid, as an operator on cell pressures:
 //
-//   L p = sum over faces of T (p_c - p_neighbour) + sum over sides of given pressure of T p_c,  m3/s
-//   b   = sum over sides of T p_side, or of the flux that enters,  m3/s
+//   C dp/dt = b(t) - L p,   (L p)_c = sum over faces of T (p_c - p_neighbour),   T = A k_f/(mu_f l)
+//
+// C = beta phi V, m3/Pa. k_f: harmonic mean of both cells' k; l: distance of centres. A side of given
+// pressure lies half a cell from the centre and counts in L with its T, in b with T p_side; a side of given
+// flux counts in b alone; a closed one nowhere. L is symmetric. SI throughout. Throws Error for sides that
+// contradict themselves and for a medium that is impossible, naming the cell.
 #pragma once
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "fluid/grid.hpp"
@@ -12,55 +16,64 @@
 
 namespace moraine::fluid {
 
-// Throws Error on sides that contradict themselves.
-void check_sides(const Grid& grid, const Sides& sides);
-
 class Darcy {
  public:
   Darcy(const Grid& grid, const Sides& sides);
-
-  void set(const Grid& grid, const Medium& medium);  // throws Error naming the cell that is impossible
+  void set(const Grid& grid, const Medium& medium);  // same n and periodic as before
 
   const Grid& grid() const { return grid_; }
+  std::uint64_t version() const { return version_; }  // of the coefficients: one more with each set()
   const std::vector<double>& storage() const { return storage_; }
-  const std::vector<double>& transmissibility(int axis) const { return t_[axis]; }
-  // Sum of T around each cell: the diagonal of L.
-  const std::vector<double>& outflow() const { return outflow_; }
+  const std::vector<double>& transmissibility(int axis) const { return transmissibility_[axis]; }
 
-  // y = (w C + dt L) x
-  void apply(double w, double dt, const double* x, double* y) const;
-  // y += factor b(t)
-  void add_sides(double factor, double t, double* y) const;
-  // y += factor times what enters through the sides at pressures p
-  void add_inflow(double factor, double t, const std::vector<double>& p, double* y) const;
-  // y += factor times what flows to neighbours
-  void add_flow(double factor, const double* x, double* y) const;
+  void apply(double s, const double* p, double* out) const;  // out = (C + s L) p; s in s
+  void diagonal(double s, double* out) const;                // of C + s L
+  void add_sides(double s, double t, double* out) const;     // out += s b(t)
+  // out = L p - b(t), m3/s that leave each cell. Both cells of a face see the same flux to the last bit.
+  void outflow(double t, const double* p, double* out) const;
+  void flux(int axis, double t, const double* p, double* out) const;  // m3/s, upwards along the axis
+  Exchanged inflow(double t, const double* p) const;                  // m3/s through the sides, into the grid
+  double dissipation(double t, const double* p) const;                // W, sum of T (drop of p)^2
 
-  void flux(int axis, double t, const std::vector<double>& p, std::vector<double>& out) const;
-  double dissipation(double t, const std::vector<double>& p) const;
-  // Volumes that enter through the sides in dt at pressures p, m3.
-  Exchanged through_sides(double t, double dt, const std::vector<double>& p) const;
-
-  // Neighbours of a cell: low x, high x, low y, ...; itself where there is none (then T = 0).
-  const std::array<int, 6>& neighbours(std::size_t c) const { return neighbour_[c]; }
-  const std::array<double, 6>& links(std::size_t c) const { return link_[c]; }
+  // Calls visit(axis, face, low cell, high cell); a side has no_cell there.
+  static constexpr std::size_t no_cell = static_cast<std::size_t>(-1);
+  template <class Visit>
+  void each_face(int axis, Visit&& visit) const {
+    const auto& n = grid_.n;
+    std::array<int, 3> i{}, end = n;
+    end[axis] = grid_.faces(axis);
+    for (i[2] = 0; i[2] < end[2]; ++i[2])
+      for (i[1] = 0; i[1] < end[1]; ++i[1])
+        for (i[0] = 0; i[0] < end[0]; ++i[0]) {
+          auto low = i;
+          --low[axis];
+          const bool below = low[axis] >= 0, above = i[axis] < n[axis];
+          if (!below && grid_.periodic[axis]) low[axis] = n[axis] - 1;
+          visit(axis, grid_.face(axis, i[0], i[1], i[2]),
+                below || grid_.periodic[axis] ? grid_.cell(low[0], low[1], low[2]) : no_cell,
+                above ? grid_.cell(i[0], i[1], i[2]) : no_cell);
+        }
+  }
 
  private:
-  struct Opening {  // a face on a side through which water passes
-    std::size_t cell, face;
-    int axis;
-    bool high;
+  // Rows of one value, as neighbours beyond the sides.
+  struct Beyond {
+    std::array<double, 2> x{};
+    std::array<const double*, 2> y{}, z{};
   };
-  const Side& side(const Opening& o) const { return o.high ? sides_.high[o.axis] : sides_.low[o.axis]; }
-  double inflow(const Opening& o, double t, double p) const;  // m3/s
+  template <bool with_storage>
+  void sweep(double s, const Beyond& beyond, const double* p, double* out) const;
+  template <class Visit>
+  void each_side_cell(int axis, bool high, Visit&& visit) const;
+  double pressure_beyond(const Side& side, double t) const;
 
   Grid grid_;
   Sides sides_;
-  std::vector<double> storage_, outflow_;
-  std::array<std::vector<double>, 3> t_;
-  std::vector<std::array<int, 6>> neighbour_;
-  std::vector<std::array<double, 6>> link_;
-  std::vector<Opening> openings_;
+  std::uint64_t version_ = 0;
+  std::vector<double> storage_;
+  std::array<std::vector<double>, 3> transmissibility_;
+  std::vector<double> zeros_;
+  mutable std::array<std::vector<double>, 4> rows_;
 };
 
 }  // namespace moraine::fluid

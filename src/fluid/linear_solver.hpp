@@ -1,49 +1,58 @@
-// Linear solvers for (w C + dt L) x = b behind SUNDIALS' interface: its conjugate gradients with the diagonal
-// as preconditioner, and a direct one of our own around CHOLMOD, whose symbolic analysis is done once and
-// whose numeric factor is kept until it is told that the matrix has changed (SUNLinSolSetup).
+// Solves (C + s L) p = b for the symmetric positive definite operator of darcy.hpp through SUNDIALS' linear
+// solver interface: conjugate gradients (SUNLinSol_PCG, matrix-free) with the diagonal or CHOLMOD as
+// preconditioner, or CHOLMOD itself with iterative refinement.
 #pragma once
 #include <sundials/sundials_linearsolver.h>
-#include <sundials/sundials_nvector.h>
 
 #include <cstdint>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "fluid/darcy.hpp"
 
 namespace moraine::fluid {
 
-struct FreeContext {
-  void operator()(SUNContext c) const { SUNContext_Free(&c); }
-};
-struct FreeVector {
-  void operator()(N_Vector v) const { N_VDestroy(v); }
-};
-struct FreeSolver {
-  void operator()(SUNLinearSolver s) const { SUNLinSolFree(s); }
-};
-template <class Pointer, class Free>
-using Owned = std::unique_ptr<std::remove_pointer_t<Pointer>, Free>;
+// CHOLMOD's factor of C + s L. The symbolic analysis is made once, at the first factor.
+class Cholmod {
+ public:
+  explicit Cholmod(const Darcy& darcy);
+  ~Cholmod();
+  Cholmod(Cholmod&&) = delete;
+  void factor(double s);  // throws Error where the matrix is not positive definite in double precision
+  void solve(const double* b, double* x);
+  std::int64_t factorisations() const;
+  std::size_t cells() const;
 
-Owned<SUNContext, FreeContext> make_context();  // SUNDIALS' own messages go to errors, not to the terminal
-
-// The matrix at hand.
-struct System {
-  const Darcy* darcy = nullptr;
-  double w = 1, dt = 0;
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
-// The custom solver: a SUNLinearSolver of the matrix that `system` describes when SUNLinSolSetup is called
-// (its SUNMatrix argument is not used). system must outlive it.
-Owned<SUNLinearSolver, FreeSolver> make_cholmod(const System& system, SUNContext context);
-std::int64_t cholmod_factorisations(SUNLinearSolver solver);
+// The same as a SUNLinearSolver (direct; its matrix argument is not used, setup and s are the owner's).
+SUNLinearSolver make_cholmod_solver(Cholmod& cholmod, SUNContext context);
 
-// A vector of n numbers; its dot products are those of SUNDIALS, but for the speed.
-Owned<N_Vector, FreeVector> make_vector(std::size_t n, SUNContext context);
+enum class Method { pcg_jacobi, pcg_cholmod, cholmod };
+const char* name(Method method);
 
-// Conjugate gradients with preconditioner 1/diagonal.
-Owned<SUNLinearSolver, FreeSolver> make_pcg(System& system, N_Vector like, int max_iterations,
-                                            SUNContext context);
+class LinearSolver {
+ public:
+  LinearSolver(const Darcy& darcy, const SolverOptions& options);
+  ~LinearSolver();
+  LinearSolver(LinearSolver&&) = delete;
+
+  // x: in, the guess; out, the solution: |b - A x| <= max(tolerance |b|, what rounding of A x allows).
+  // Throws Error where that is not reached. What comes out depends on the coefficients, s and the arguments
+  // alone, not on what was solved before.
+  void solve(double s, const double* b, double* x);
+
+  Method method() const;  // of the last solve
+  std::int64_t solves() const;
+  std::int64_t iterations() const;
+  std::int64_t factorisations() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
 
 }  // namespace moraine::fluid
