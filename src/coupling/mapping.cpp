@@ -144,6 +144,7 @@ void Mapping::build(const fluid::Grid& grid, const std::array<bool, 3>& open_low
   for (std::size_t c = 0; c < phi_.size(); ++c) phi_[c] = 1 - solid[c] / grid.cell_volume();
 
   std::vector<Stencil> stencils(n_);
+  std::vector<double> exact, rounded;  // sums of b over each face
   for (int axis = 0; axis < 3; ++axis) {
     const std::size_t faces = grid.face_count(axis);
     std::vector<Moments> moments(faces);
@@ -155,6 +156,7 @@ void Mapping::build(const fluid::Grid& grid, const std::array<bool, 3>& open_low
     std::vector<Vec3d> slope(faces, {0, 0, 0});
     std::vector<double> scale(faces, 0);  // A/W; 0 at closed sides
     psi_[axis].assign(faces, 0), layer_[axis].assign(faces, 0);
+    exact.assign(faces, 0), rounded.assign(faces, 0);
     const double area = grid.face_area(axis), volume = grid.cell_volume();
     for (int k = 0; k < (axis == 2 ? grid.faces(2) : grid.n[2]); ++k)
       for (int j = 0; j < (axis == 1 ? grid.faces(1) : grid.n[1]); ++j)
@@ -167,7 +169,8 @@ void Mapping::build(const fluid::Grid& grid, const std::array<bool, 3>& open_low
           psi_[axis][f] = m.m0 / hat;
           if (side && !(at == 0 ? open_low : open_high)[axis]) continue;
           slope[f] = affine_correction(m, psi_[axis][f], side ? axis : -1);
-          scale[f] = area / std::max(m.m0 + dot(slope[f], m.m1), psi_min * hat);
+          const double w = std::max(m.m0 + dot(slope[f], m.m1), psi_min * hat);
+          scale[f] = area / w, psi_[axis][f] = w / hat;
         }
 
     for (Index c = 0; c < chunks(); ++c) {
@@ -202,6 +205,7 @@ void Mapping::build(const fluid::Grid& grid, const std::array<bool, 3>& open_low
             const double b = scale[f] * dem::sphere_volume(grains[i].r) * stencils[i].w[e] *
                              (1 + dot(slope[f], stencils[i].xi[e]));
             pack.b[e][lane % 4] = static_cast<float>(b);
+            exact[f] += b, rounded[f] += pack.b[e][lane % 4];
             if (top_layer[i]) layer_[axis][f] += pack.b[e][lane % 4];
           }
         }
@@ -211,6 +215,9 @@ void Mapping::build(const fluid::Grid& grid, const std::array<bool, 3>& open_low
       }
       a.sum.assign(a.face.size(), 0);
     }
+    scale_[axis].assign(faces, 0);
+    for (std::size_t f = 0; f < faces; ++f)
+      if (rounded[f] != 0) scale_[axis][f] = exact[f] / rounded[f];
   }
   start_from(x);
 }
@@ -299,6 +306,8 @@ double Mapping::collect(Faces& u) const {
     }
     moved = std::max(moved, chunk.moved);
   }
+  for (int axis = 0; axis < 3; ++axis)
+    for (std::size_t f = 0; f < u[axis].size(); ++f) u[axis][f] *= scale_[axis][f];
   return moved;
 }
 
@@ -331,7 +340,8 @@ void Mapping::apply(const std::vector<Vec3d>& d, Faces& u) const {
         for (Index p = bin.first; p < bin.first + bin.packs; ++p) {
           const Lane4& pack = chunk.axis[axis].packs[p];
           for (int k = 0; k < 4; ++k)  // lanes that hold no grain have no weight
-            for (int e = 0; e < 8; ++e) u[axis][bin.face[e]] += pack.b[e][k] * d[pack.grain[k]][axis];
+            for (int e = 0; e < 8; ++e)
+              u[axis][bin.face[e]] += scale_[axis][bin.face[e]] * (pack.b[e][k] * d[pack.grain[k]][axis]);
         }
 }
 

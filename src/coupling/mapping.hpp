@@ -54,8 +54,10 @@ class Mapping {
   // The same sums for any vectors by grain, for the analysis of stability; slow.
   void apply(const std::vector<dem::Vec3d>& d, Faces& u) const;
 
+  // What U and g of each face are multiplied with, outside of these sums.
+  const Faces& scale() const { return scale_; }
   const Faces& layer() const { return layer_; }         // m2, sum of b over the grains of the top layer
-  const Faces& solid_fraction() const { return psi_; }  // 1, about each face: sum of V w over the volume of w
+  const Faces& solid_fraction() const { return psi_; }  // 1, about each face: W_f over the volume of w
   const std::vector<double>& porosity() const { return phi_; }  // of each cell, by hats about its centre
 
  private:
@@ -66,8 +68,8 @@ class Mapping {
     int in_last;  // grains in the last pack
   };
   // Four grains. The weights are rounded to single precision: they are read twice in a step, and memory is
-  // what that takes time for. Both ways use the same rounded ones, so nothing is lost but 1e-7 of what passes
-  // for rigid motion.
+  // what that takes time for. Both ways use the same ones, and scale() puts their sum over a face right
+  // again, so that rigid motion and momentum are exact all the same.
   struct Lane4 {
     std::array<std::array<float, 4>, 8> b;  // m2
     std::array<Index, 4> grain;
@@ -89,7 +91,7 @@ class Mapping {
   void add_up(Index chunk, Displacement&& displacement);
 
   std::vector<Chunk> chunks_;
-  Faces layer_, psi_;
+  Faces layer_, psi_, scale_;
   std::vector<double> phi_;
   Index n_ = 0;
 };

@@ -39,7 +39,8 @@ class GridWater final : public PoreWater {
     }
     grains_ = dem::grain_rows(scene, s);
     for (int a = 0; a < 3; ++a) {
-      u_[a].resize(grid_.face_count(a)), g_[a].resize(grid_.face_count(a));
+      u_[a].resize(grid_.face_count(a)), g_[a].resize(grid_.face_count(a)),
+          push_[a].resize(grid_.face_count(a));
     }
     div_u_.resize(grid_.cells());
     closed_ = water.top == TopSide::impermeable;
@@ -103,7 +104,9 @@ class GridWater final : public PoreWater {
       for (std::size_t f = 0; f < static_cast<std::size_t>(nx) * ny; ++f) out_bottom -= u_[2][f];
       now_.drained_bottom += out_bottom - in.low[2];
       now_.drained_sides -= in.low[0] + in.high[0] + in.low[1] + in.high[1];
-      now_.dissipated += dt * step_.dissipation(t, now_.p);
+      const double dissipation = step_.dissipation(t, now_.p);
+      now_.dissipated += 0.5 * dt * (now_.dissipation + dissipation);
+      now_.dissipation = dissipation;
       for (int a = 0; a < 3; ++a)
         now_.side_work += side_pressure(a, false, t) * in.low[a] + side_pressure(a, true, t) * in.high[a];
     }
@@ -118,7 +121,7 @@ class GridWater final : public PoreWater {
     if (closed_)  // their displacement is the wall's
       for (std::size_t f = grid_.face(2, 0, 0, nz); f < u_[2].size(); ++f)
         out.work -= 0.5 * (before_[2][f] + g_[2][f]) * u_[2][f];
-    for (std::size_t f = 0; f < g_[0].size(); ++f) out.layer += mapping_.layer()[0][f] * g_[0][f];
+    for (std::size_t f = 0; f < g_[0].size(); ++f) out.layer += mapping_.layer()[0][f] * push_[0][f];
     const double m = static_cast<double>(interval_);
     out.layer *= m;
     if (has_wall(scene_)) {
@@ -134,7 +137,7 @@ class GridWater final : public PoreWater {
     return out;
   }
 
-  void push(dem::Index chunk, dem::WaterRow* force) override { mapping_.push(chunk, g_, force); }
+  void push(dem::Index chunk, dem::WaterRow* force) override { mapping_.push(chunk, push_, force); }
 
   std::int64_t interval() const override { return interval_; }
   Stability stability() const override { return stability_; }
@@ -342,6 +345,7 @@ class GridWater final : public PoreWater {
       }
       if (water_.closure == Closure::pressure_gradient)
         for (std::size_t f = 0; f < g_[a].size(); ++f) g_[a][f] *= mapping_.solid_fraction()[a][f];
+      for (std::size_t f = 0; f < g_[a].size(); ++f) push_[a][f] = mapping_.scale()[a][f] * g_[a][f];
     }
     if (!has_wall(scene_)) return;
     if (closed_) {
@@ -362,7 +366,7 @@ class GridWater final : public PoreWater {
     std::vector<Vec3d> d(x_.size());
     std::vector<double> p(grid_.cells());
     Faces u = u_;
-    const Faces g = g_;
+    const Faces g = g_, keep_push = push_;
     const std::vector<double> keep = now_.p;
     const double keep_wall = now_.wall_pressure;
     for (std::size_t c = 0; c < p.size(); ++c) {
@@ -383,7 +387,7 @@ class GridWater final : public PoreWater {
       for (double& v : p) v /= norm;
       now_.p = p;
       gradients(0);
-      for (dem::Index c = 0; c < chunks; ++c) mapping_.push(c, g_, force.data());
+      for (dem::Index c = 0; c < chunks; ++c) mapping_.push(c, push_, force.data());
       for (std::size_t i = 0; i < x_.size(); ++i) d[i] = (1 / (scene_.density * volume_[i])) * force[i].f;
       mapping_.apply(d, u);
       if (closed_) {
@@ -405,7 +409,8 @@ class GridWater final : public PoreWater {
       }
       lambda = along / norm2;
     }
-    now_.p = keep, now_.wall_pressure = keep_wall, g_ = g, water_.closure = closure, water_.sides = sides;
+    now_.p = keep, now_.wall_pressure = keep_wall, g_ = g, push_ = keep_push, water_.closure = closure,
+    water_.sides = sides;
     return lambda + std::abs(lambda - last);
   }
 
@@ -443,6 +448,7 @@ class GridWater final : public PoreWater {
   std::vector<dem::GrainRow> grains_;  // radii
   double solids_ = 0;                  // m3
   Faces u_, g_, before_;
+  Faces push_;  // g_ for Mapping::push
   std::vector<double> div_u_;
   double t_ = 0;
   WaterState now_;

@@ -53,6 +53,7 @@ struct WaterState {
   double drained_top = 0, drained_bottom = 0, drained_sides = 0;  // m3 of water that left
   double side_work = 0;                                           // J, that the sides' pressures put in
   double dissipated = 0;                                          // J, by the flow
+  double dissipation = 0;                                         // W, at the last exchange
   double volume_0 = 0;  // m3, of water when the stage began: sum of phi V (1 + beta p)
 };
 

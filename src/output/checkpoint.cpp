@@ -155,6 +155,7 @@ constexpr std::tuple members<coupling::WaterState>{
     Member{"drained_sides", &coupling::WaterState::drained_sides},
     Member{"side_work", &coupling::WaterState::side_work},
     Member{"dissipated", &coupling::WaterState::dissipated},
+    Member{"dissipation", &coupling::WaterState::dissipation},
     Member{"volume_0", &coupling::WaterState::volume_0},
 };
 

@@ -1,7 +1,8 @@
-// A packing in water, with and without walls, that several tests share.
+// Packings in water that several tests share.
 #pragma once
 #include "../physics/scenes.hpp"
 #include "coupling/pore_water.hpp"
+#include "error.hpp"
 
 namespace moraine::coupling {
 
@@ -14,53 +15,113 @@ struct WetBed {
   State state;
 };
 
-// Some 800 elastic grains of mixed size, pressed by a wall at 10 kPa without gravity and come to rest; x and y are
-// periodic. softness divides the contacts' stiffness.
-inline const WetBed& pressed_bed() {
-  static const WetBed bed = [] {
-    dem::Packing p;
-    p.count = 800, p.columns_x = p.columns_y = 8;
-    p.radius_mean = 0.01, p.radius_std = 0.001, p.cell = 1.05, p.seed = 5;
-    const dem::Lattice lattice = dem::make_lattice(p);
-    WetBed out;
-    Scene& s = out.scene;
-    s.box = {lattice.box_x * 0.9, lattice.box_y * 0.9, 1};
-    s.box = {lattice.box_x, lattice.box_y, 1};
-    s.gravity = 9.8;
-    s.grain = s.wall = {1e6, 1e6, 50, 20, 0.2, 0.2};
-    s.dt = 0.1 * std::sqrt(dem::mass(s, 0.008) / s.grain.k_n);
-    State state = lattice.state;
-    dem::sort_spatially(s, state);
-    const auto engine = dem::make_engine(dem::Backend::cpu, 1);
-    state = dem::run(*engine, s, state, 30000);
-    dem::synchronise(s, state);
+inline void stop(State& s) {
+  for (auto* v : {&s.v, &s.omega, &s.rotation}) std::fill(v->begin(), v->end(), Vec3d{0, 0, 0});
+  s.wall_v = 0, s.step = 0, s.ledger = {};
+}
+
+inline double bed_top(const State& s) {
+  double top = 0;
+  for (dem::Index i = 0; i < s.size(); ++i) top = std::max(top, s.x[i].z + s.r[i]);
+  return top;
+}
+
+// Grains of 2 cm settled under gravity, x and y periodic; then, with a stress, pressed by a wall without
+// gravity. At rest.
+inline WetBed make_bed(int count, int columns, double normal_stress) {
+  dem::Packing p;
+  p.count = count, p.columns_x = p.columns_y = columns;
+  p.radius_mean = 0.01, p.radius_std = 0.0008, p.cell = 1.05, p.seed = 5;
+  const dem::Lattice lattice = dem::make_lattice(p);
+  WetBed bed;
+  Scene& s = bed.scene;
+  s.box = {lattice.box_x, lattice.box_y, 1};
+  s.grain = s.wall = {1e6, 1e6, 50, 20, 0.3, 0.3};
+  s.dt = 0.1 * std::sqrt(dem::mass(s, 0.008) / s.grain.k_n);
+  State state = lattice.state;
+  dem::sort_spatially(s, state);
+  const auto engine = dem::make_engine(dem::Backend::cpu, 1);
+  state = dem::run(*engine, s, state, 40000);
+  dem::synchronise(s, state);
+  stop(state);
+  if (normal_stress > 0) {
     s.gravity = 0;
-    s.top_wall.drive = dem::TopWall::Drive::stress, s.top_wall.mass = 5, s.top_wall.sigma_0 = 1e4;
-    double top = 0;
-    for (dem::Index i = 0; i < state.size(); ++i) top = std::max(top, state.x[i].z + state.r[i]);
-    state.wall_z = top, state.step = 0;
-    state = dem::run(*engine, s, state, 40000);
+    s.top_wall.drive = dem::TopWall::Drive::stress, s.top_wall.mass = 5, s.top_wall.sigma_0 = normal_stress;
+    s.grain.mu_s = s.grain.mu_d = 0.1;  // packs more closely, and hardly slides later
+    state.wall_z = bed_top(state);
+    state = dem::run(*engine, s, state, 60000);
     dem::synchronise(s, state);
-    for (auto* v : {&state.v, &state.omega}) std::fill(v->begin(), v->end(), Vec3d{0, 0, 0});
-    state.wall_v = 0, state.step = 0, state.ledger = {};
-    dem::sort_spatially(s, state);
-    out.state = state;
-    return out;
-  }();
+    s.grain.mu_s = s.grain.mu_d = 0.5;
+    stop(state);
+    state = dem::run(*engine, s, state, 20000);
+    dem::synchronise(s, state);
+    stop(state);
+  }
+  dem::sort_spatially(s, state);
+  bed.state = state;
   return bed;
 }
 
-// Of cells some 2.5 diameters wide over a bed.
+// Some 800 grains pressed at 10 kPa, 0.22 m wide and 0.11 m high.
+inline const WetBed& pressed_bed() {
+  static const WetBed bed = make_bed(800, 8, 1e4);
+  return bed;
+}
+// A column for one-dimensional problems: as many, 0.11 m wide and half a metre high.
+inline const WetBed& tall_bed() {
+  static const WetBed bed = make_bed(900, 5, 1e4);
+  return bed;
+}
+inline const WetBed& heavy_bed() {  // settled, without a wall
+  static const WetBed bed = make_bed(800, 6, 0);
+  return bed;
+}
+
+// Real water in cells some 2.5 diameters wide; drained at the top.
 inline Water water_over(const WetBed& bed, double height = 0) {
   Water w;
   w.present = true;
   const double h = 0.05, z = height > 0 ? height : bed.state.wall_z;
-  w.cells = {std::max(1, static_cast<int>(bed.scene.box.x / h)), std::max(1, static_cast<int>(bed.scene.box.y / h)),
-             std::max(1, static_cast<int>(z / h))};
+  w.cells = {std::max(1, static_cast<int>(bed.scene.box.x / h)),
+             std::max(1, static_cast<int>(bed.scene.box.y / h)), std::max(1, static_cast<int>(z / h))};
   w.height = height;
   w.k_c = 1e-12;
   w.sides.high[2].kind = fluid::Side::Kind::pressure;
   return w;
+}
+
+// A bed in water under way.
+struct WetRun {
+  Scene scene;
+  std::unique_ptr<PoreWater> water;
+  std::unique_ptr<dem::Engine> engine;
+
+  WetRun(const WetBed& bed, const Water& w, const WaterState& before = {},
+         dem::Backend backend = dem::Backend::cpu, int threads = 1)
+      : scene(bed.scene),
+        water(make_pore_water(w, bed.scene, bed.state, before, false)),
+        engine(dem::make_engine(backend, threads)) {
+    scene.exchange_interval = water->interval();
+    engine->load(scene, bed.state, water.get());
+  }
+  // At least so many steps, and up to an exchange.
+  void advance(std::int64_t steps) {
+    const std::int64_t m = scene.exchange_interval;
+    engine->advance((steps + m - 1) / m * m);
+  }
+};
+
+// A uniform pressure to begin with.
+inline WaterState under_pressure(const WetBed& bed, const Water& w, double p) {
+  const auto water = make_pore_water(w, bed.scene, bed.state, {}, false);
+  const WaterFields f = water->fields();
+  WaterState s;
+  s.p.assign(f.grid.cells(), p), s.q.resize(f.grid.cells());
+  for (std::size_t c = 0; c < s.q.size(); ++c) {
+    const double phi = std::clamp(f.porosity[c], w.porosity_range[0], w.porosity_range[1]);
+    s.q[c] = w.compressibility * phi * f.grid.cell_volume() * p;
+  }
+  return s;
 }
 
 }  // namespace moraine::coupling

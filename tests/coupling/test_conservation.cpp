@@ -1,0 +1,151 @@
+// What the coupling keeps exactly, whatever it is used for.
+#include "wet_scenes.hpp"
+
+namespace moraine::coupling {
+namespace {
+
+// A sheared bed that dilates and collides in a shut box.
+WetBed sheared() {
+  WetBed bed = pressed_bed();
+  for (dem::Index i = 0; i < bed.state.size(); ++i) {
+    const Vec3d& x = bed.state.x[i];
+    bed.state.v[i] = {2 * x.z, 0.1 * std::sin(40 * x.x), 0.1 * std::cos(30 * x.y)};
+  }
+  return bed;
+}
+
+TEST(ClosedBox, KeepsItsWater) {
+  Water w = water_over(sheared());
+  w.top = TopSide::impermeable, w.sides = {};
+  WetRun run(sheared(), w);
+  const double before = run.water->record(0).volume;
+  for (int k = 0; k < 20; ++k) {
+    run.advance(500);
+    // Sums of some hundred cells' rounding; the row of verification.md asks for 1e-10.
+    EXPECT_NEAR(run.water->record(0).volume / before, 1, 1e-12);
+    EXPECT_NEAR(run.water->record(0).balance / before, 0, 1e-12);
+  }
+  EXPECT_GT(run.water->state().moved + run.water->state().exchanges, 0);
+}
+
+TEST(DrainedBox, BooksWhatLeaves) {
+  WetRun run(sheared(), water_over(sheared()));
+  const double before = run.water->record(0).volume;
+  run.advance(10000);
+  EXPECT_NE(run.water->state().drained_top, 0);
+  EXPECT_NEAR(run.water->record(0).balance / before, 0, 1e-12);
+}
+
+TEST(Momentum, OfGrainsIsTheLossOfTheWater) {
+  for (const TopSide top : {TopSide::drained, TopSide::impermeable}) {
+    Water w = water_over(sheared());
+    w.top = top;
+    w.sides.high[2].value = top == TopSide::drained ? 3e3 : 0;
+    if (top == TopSide::impermeable) w.sides = {};
+    WetRun run(sheared(), w);
+    run.advance(3000);
+    const State s = run.engine->state();
+    const WaterFields f = run.water->fields();
+    Vec3d sum{0, 0, 0};
+    double scale = 0;
+    for (const Vec3d& force : s.water_force) sum += force, scale += dem::length(force);
+    const double area = run.scene.area(), column = f.grid.face_area(2);
+    double floor = 0;  // the water's thrust on the floor, downwards
+    for (std::size_t c = 0; c < f.grid.cell(0, 0, 1); ++c) floor += column * f.pressure[c];
+    const double wall = area * run.water->state().wall_pressure;
+    ASSERT_GT(scale, 1);
+    // Sums of some thousand roundings; the row of verification.md asks for 1e-10.
+    EXPECT_NEAR(sum.x / scale, 0, 1e-12);
+    EXPECT_NEAR(sum.y / scale, 0, 1e-12);
+    EXPECT_NEAR((sum.z + wall - floor) / scale, 0, 1e-12);
+  }
+}
+
+TEST(Energy, OfGrainsAndWaterIsKept) {
+  WetBed bed = sheared();
+  bed.scene.grain.gamma_n = bed.scene.grain.gamma_t = bed.scene.wall.gamma_n = bed.scene.wall.gamma_t = 0;
+  for (const TopSide top : {TopSide::drained, TopSide::impermeable}) {
+    Water w = water_over(bed);
+    w.top = top, w.k_c = 1e-10;
+    if (top == TopSide::impermeable) w.sides = {};
+    w.interval = 1;
+    bed.scene.dt *= 0.2;
+    WetRun run(bed, w);
+    const auto total = [&] {
+      const State s = run.engine->state();
+      const dem::Ledger& l = s.ledger;
+      return dem::observe(run.scene, s).energy.total() + l.slip - l.top_wall;
+    };
+    const double start = total() + run.water->record(0).stored;
+    run.advance(20000);
+    const WaterState water = run.water->state();
+    const double given = -run.engine->state().ledger.water, stored = run.water->record(0).stored;
+    ASSERT_GT(given, 1e-3 * start);
+    // Dissipation is booked by the mean of the pressures before and after a step, and new weights give cells
+    // a new storage: a thousandth.
+    EXPECT_NEAR((stored + water.dissipated) / given, 1, 1e-3);
+    // What grains lose is what the water takes: to the leapfrog's own residue.
+    EXPECT_NEAR((total() + given - start) / start, 0, 2e-4);
+  }
+}
+
+TEST(RigidMotion, DisplacesNoWater) {
+  WetBed bed = pressed_bed();
+  bed.scene.grain = bed.scene.wall = {1e-3, 0, 0, 0, 0, 0};
+  bed.scene.top_wall = {};
+  bed.scene.floor = false;
+  for (auto& v : bed.state.v) v = {0.3, -0.2, 0};
+  Water w = water_over(bed, bed.state.wall_z);
+  w.sides = {}, w.top = TopSide::drained;
+  WetRun run(bed, w);
+  run.advance(20);  // 0.1 mm
+  // Rounding, 1e-16, of 0.1 mm over a cell of 5 cm, over phi beta = 2e-10; real motion would give 1e7 Pa.
+  EXPECT_LT(std::max(run.water->record(0).most, -run.water->record(0).least), 1e-5);
+}
+
+TEST(OneGrain, InHydrostaticWaterIsBuoyant) {
+  WetBed bed;
+  bed.scene = dem::empty_space(1e5);
+  bed.scene.gravity = 9.8, bed.scene.dt = 1e-5, bed.scene.fluid_density = 1000;
+  bed.scene.box = {0.2, 0.2, 1};
+  bed.scene.periodic_x = bed.scene.periodic_y = true;
+  bed.state = dem::make_lattice({.count = 1, .radius_mean = 0.01, .radius_std = 0}).state;
+  bed.state.x[0] = {0.1, 0.1, 0.5};
+  const auto engine = dem::make_engine(dem::Backend::cpu, 1);
+  State s = dem::run(*engine, bed.scene, bed.state, 1000);
+  dem::synchronise(bed.scene, s);
+  const double a = -s.v[0].z / (1000 * 1e-5);
+  EXPECT_NEAR(a / ((1 - 1000 / bed.scene.density) * 9.8), 1, 1e-12);
+}
+
+TEST(LinearPressure, PushesAGrainAlikeWhereverItIs) {
+  for (const Closure closure : {Closure::full, Closure::pressure_gradient}) {
+    double first = 0;
+    for (const double at : {0.0, 0.011, 0.02, 0.037, 0.049}) {
+      WetBed bed;
+      bed.scene = dem::empty_space(1e5);
+      bed.scene.gravity = 0, bed.scene.dt = 1e-6, bed.scene.box = {0.2, 0.2, 1};
+      bed.scene.periodic_x = bed.scene.periodic_y = true;
+      bed.state = dem::make_lattice({.count = 1, .radius_mean = 0.01, .radius_std = 0}).state;
+      bed.state.x[0] = {0.05 + at, 0.08 - at, 0.25 + at};
+      Water w = water_over(bed, 0.5);
+      w.closure = closure;
+      w.sides.low[2] = {fluid::Side::Kind::pressure, 1000};
+      WaterState before = under_pressure(bed, w, 1);
+      const double h = 0.05;
+      for (std::size_t c = 0; c < before.q.size(); ++c)
+        before.q[c] *= 1000 * (1 - (static_cast<double>(c / 16) + 0.5) * h / 0.5);
+      WetRun run(bed, w, before);
+      const Vec3d f = run.engine->state().water_force.at(0);
+      const double expected = dem::sphere_volume(bed.state.r[0]) * 1000 / 0.5 /
+                              (closure == Closure::full ? 0.1 : 1.0);  // by the floor of the solid fraction
+      EXPECT_NEAR(f.z / expected, 1, 1e-12);
+      EXPECT_NEAR(f.x / expected, 0, 1e-12);
+      if (first == 0) first = f.z;
+      EXPECT_NEAR(f.z / first, 1, 1e-12);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace moraine::coupling
