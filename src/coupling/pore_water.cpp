@@ -47,7 +47,8 @@ class GridWater final : public PoreWater {
 
     if (restart) {
       now_ = before;
-      map(now_.x_map);
+      map(before.x_map);
+      now_.moved = before.moved;
       mapping_.start_from(s.x);
       t_ = scene.time(s.step);
       gradients(t_);
@@ -158,16 +159,14 @@ class GridWater final : public PoreWater {
     return out;
   }
 
-  WaterRecord record(double from_z) const override {
+  WaterRecord record(bool upper_half) const override {
     WaterRecord r;
     r.least = 1e300, r.most = -1e300;
-    std::size_t count = 0;
-    for (int k = 0; k < grid_.n[2]; ++k) {
-      if ((k + 0.5) * grid_.h(2) < from_z && k + 1 < grid_.n[2]) continue;
-      for (std::size_t c = grid_.cell(0, 0, k); c < grid_.cell(0, 0, k + 1); ++c, ++count) {
-        r.mean += now_.p[c];
-        r.least = std::min(r.least, now_.p[c]), r.most = std::max(r.most, now_.p[c]);
-      }
+    const std::size_t first = grid_.cell(0, 0, upper_half ? grid_.n[2] / 2 : 0),
+                      count = now_.p.size() - first;
+    for (std::size_t c = first; c < now_.p.size(); ++c) {
+      r.mean += now_.p[c];
+      r.least = std::min(r.least, now_.p[c]), r.most = std::max(r.most, now_.p[c]);
     }
     r.mean /= static_cast<double>(count);
     for (std::size_t c = 0; c < now_.q.size(); ++c)

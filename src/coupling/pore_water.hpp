@@ -38,8 +38,8 @@ class PoreWater : public dem::Surroundings {
   virtual Stability stability() const = 0;
   virtual WaterState state() const = 0;  // after an exchange
   virtual WaterFields fields() const = 0;
-  // Shear zone: cells whose centres lie above `from_z`, m.
-  virtual WaterRecord record(double from_z) const = 0;
+  // Pressures over all cells, or over the upper half of their levels, where a sheared bed deforms.
+  virtual WaterRecord record(bool upper_half) const = 0;
   virtual std::string solver() const = 0;  // as used so far, e.g. "pcg, jacobi: 6.2 iterations a solve"
   virtual std::string describe()
       const = 0;  // e.g. "water: 8 x 8 x 7 cells of 0.105 m (2.6 d), exchange every step, pcg"

@@ -61,8 +61,7 @@ output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, d
 }
 
 void add_water(output::Row& row, const Stage& stage, const coupling::PoreWater& water) {
-  // A sheared bed deforms in its upper half.
-  const coupling::WaterRecord r = water.record(shears(stage.kind) ? 0.5 * row.height : 0);
+  const coupling::WaterRecord r = water.record(/*upper_half=*/shears(stage.kind));
   const coupling::WaterState s = water.state();
   row.wall_water_pressure = s.wall_pressure;
   row.total_friction = row.shear_stress / (row.normal_stress + s.wall_pressure);

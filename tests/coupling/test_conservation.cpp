@@ -18,22 +18,22 @@ TEST(ClosedBox, KeepsItsWater) {
   Water w = water_over(sheared());
   w.top = TopSide::impermeable, w.sides = {};
   WetRun run(sheared(), w);
-  const double before = run.water->record(0).volume;
+  const double before = run.water->record(false).volume;
   for (int k = 0; k < 20; ++k) {
     run.advance(500);
     // Sums of some hundred cells' rounding; the row of verification.md asks for 1e-10.
-    EXPECT_NEAR(run.water->record(0).volume / before, 1, 1e-12);
-    EXPECT_NEAR(run.water->record(0).balance / before, 0, 1e-12);
+    EXPECT_NEAR(run.water->record(false).volume / before, 1, 1e-12);
+    EXPECT_NEAR(run.water->record(false).balance / before, 0, 1e-12);
   }
   EXPECT_GT(run.water->state().moved + run.water->state().exchanges, 0);
 }
 
 TEST(DrainedBox, BooksWhatLeaves) {
   WetRun run(sheared(), water_over(sheared()));
-  const double before = run.water->record(0).volume;
+  const double before = run.water->record(false).volume;
   run.advance(10000);
   EXPECT_NE(run.water->state().drained_top, 0);
-  EXPECT_NEAR(run.water->record(0).balance / before, 0, 1e-12);
+  EXPECT_NEAR(run.water->record(false).balance / before, 0, 1e-12);
 }
 
 TEST(Momentum, OfGrainsIsTheLossOfTheWater) {
@@ -76,10 +76,10 @@ TEST(Energy, OfGrainsAndWaterIsKept) {
       const dem::Ledger& l = s.ledger;
       return dem::observe(run.scene, s).energy.total() + l.slip - l.top_wall;
     };
-    const double start = total() + run.water->record(0).stored;
+    const double start = total() + run.water->record(false).stored;
     run.advance(20000);
     const WaterState water = run.water->state();
-    const double given = -run.engine->state().ledger.water, stored = run.water->record(0).stored;
+    const double given = -run.engine->state().ledger.water, stored = run.water->record(false).stored;
     ASSERT_GT(given, 1e-3 * start);
     // Dissipation is booked by the mean of the pressures before and after a step, and new weights give cells
     // a new storage: a thousandth.
@@ -100,7 +100,7 @@ TEST(RigidMotion, DisplacesNoWater) {
   WetRun run(bed, w);
   run.advance(20);  // 0.1 mm
   // Rounding, 1e-16, of 0.1 mm over a cell of 5 cm, over phi beta = 2e-10; real motion would give 1e7 Pa.
-  EXPECT_LT(std::max(run.water->record(0).most, -run.water->record(0).least), 1e-5);
+  EXPECT_LT(std::max(run.water->record(false).most, -run.water->record(false).least), 1e-5);
 }
 
 TEST(OneGrain, InHydrostaticWaterIsBuoyant) {

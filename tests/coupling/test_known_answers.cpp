@@ -1,0 +1,252 @@
+// Grains and water against answers that are known: the rows of verification.md with grains in them.
+#include <algorithm>
+
+#include "dem/spectrum.hpp"
+#include "wet_scenes.hpp"
+
+namespace moraine::coupling {
+namespace {
+
+constexpr double step_of_stress = 1000;  // Pa, on top of 10 kPa: contacts stay as they are
+
+WetBed loaded(const WetBed& bed) {
+  WetBed out = bed;
+  out.scene.top_wall.sigma_0 += step_of_stress;
+  return out;
+}
+
+// 1/M of the dry bed, 1/Pa: how far it settles under the step of stress.
+double measured_m_v(const WetBed& bed) {
+  const WetBed dry = loaded(bed);
+  const auto engine = dem::make_engine(dem::Backend::cpu, 1);
+  engine->load(dry.scene, dry.state);
+  engine->advance(60000);
+  return (bed.state.wall_z - engine->state().wall_z) / bed.state.wall_z / step_of_stress;
+}
+
+double mean_porosity(const WetBed& bed) { return dem::observe(bed.scene, bed.state).porosity; }
+
+TEST(UndrainedLoading, HasSkemptonsB) {
+  const WetBed& bed = tall_bed();
+  const double m_v = measured_m_v(bed);
+  // Water soft enough that grains bear about half; and real water.
+  for (const double beta : {1e-7, 2e-8}) {
+    Water w = water_over(bed);
+    w.compressibility = beta, w.top = TopSide::impermeable, w.sides = {}, w.k_c = 1e-16;
+    WetRun run(loaded(bed), w);
+    run.advance(30000);  // the swing of the column has died down
+    double p = 0;
+    constexpr int samples = 50;
+    for (int k = 0; k < samples; ++k) run.advance(100), p += run.water->record(false).mean / samples;
+    const double b = 1 / (1 + mean_porosity(bed) * beta / m_v);
+    EXPECT_NEAR(p / step_of_stress / b, 1, 0.03) << "beta " << beta << ", B " << b;
+  }
+}
+
+// Terzaghi's series, closed floor and drained top; z from the floor.
+double terzaghi(double z, double t) {
+  double p = 0;
+  for (int m = 0; m < 60; ++m) {
+    const double a = std::numbers::pi * (m + 0.5);
+    p += 2 / a * std::sin(a * (1 - z)) * std::exp(-a * a * t);
+  }
+  return p;
+}
+double terzaghi_settlement(double t) {
+  double u = 1;
+  for (int m = 0; m < 60; ++m) {
+    const double a = std::numbers::pi * (m + 0.5);
+    u -= 2 / (a * a) * std::exp(-a * a * t);
+  }
+  return u;
+}
+
+// The whole step of stress is in the water to begin with, so that the column does not swing.
+TEST(Terzaghi, ConsolidationOfGrains) {
+  const WetBed& bed = tall_bed();
+  const double m_v = measured_m_v(bed), phi = mean_porosity(bed), height = bed.state.wall_z;
+  Water w = water_over(bed);
+  w.k_c = 3e-10;
+  const WaterState before = under_pressure(bed, w, step_of_stress);
+  WetRun run(loaded(bed), w, before);
+  // k of each cell follows its porosity: the flow through all of them in series.
+  const WaterFields f = run.water->fields();
+  double resistance = 0;
+  for (int k = 0; k < f.grid.n[2]; ++k) {
+    double mean = 0;
+    const int in_layer = f.grid.n[0] * f.grid.n[1];
+    for (int c = 0; c < in_layer; ++c) mean += f.permeability[k * in_layer + c] / in_layer;
+    resistance += 1 / mean / f.grid.n[2];
+  }
+  const double c_v = 1 / resistance / (w.viscosity * (m_v + phi * w.compressibility));
+  for (const double t : {0.05, 0.1, 0.2, 0.5, 1.0}) {
+    const auto steps = std::llround(t * height * height / c_v / run.scene.dt);
+    run.advance(steps - run.engine->state().step);
+    const WaterFields now = run.water->fields();
+    const int in_layer = now.grid.n[0] * now.grid.n[1];
+    double worst = 0;
+    for (int k = 0; k < now.grid.n[2]; ++k) {
+      double p = 0;
+      for (int c = 0; c < in_layer; ++c) p += now.pressure[k * in_layer + c] / in_layer;
+      worst = std::max(worst, std::abs(p / step_of_stress - terzaghi((k + 0.5) / now.grid.n[2], t)));
+    }
+    const double settlement = (height - run.engine->state().wall_z) / (height * m_v * step_of_stress);
+    std::printf("T = %.2f: largest error of p %.4f of p0, settlement %.4f (%.4f)\n", t, worst, settlement,
+                terzaghi_settlement(t));
+    EXPECT_LT(worst, 0.05) << "T = " << t;
+    EXPECT_NEAR(settlement, terzaghi_settlement(t), 0.05) << "T = " << t;
+  }
+}
+
+// Water pushed up through a bed without a wall.
+class Seepage : public ::testing::Test {
+ protected:
+  WetBed bed = heavy_bed();
+  double top = bed_top(bed.state), height = top + 0.05;
+  double weight = 0;  // N, submerged
+  double contact_floor(const WetRun& run) const {
+    const State s = run.engine->state();
+    double f = 0;
+    for (const Vec3d& force : s.force) f += force.z;  // by contacts: only the floor's is left in the sum
+    return f;
+  }
+  void SetUp() override {
+    bed.scene.fluid_density = 1000;
+    for (const double r : bed.state.r)
+      weight += dem::sphere_volume(r) * (bed.scene.density - 1000) * bed.scene.gravity;
+  }
+  WetRun under(double share) {
+    Water w = water_over(bed, height);
+    w.k_c = 1e-8;
+    w.sides.low[2] = {fluid::Side::Kind::pressure, share * weight / bed.scene.area()};
+    return WetRun(bed, w);
+  }
+};
+
+TEST_F(Seepage, SettledBedCarriesItsSubmergedWeight) {
+  WetRun run = under(0);
+  run.advance(60000);
+  const WaterRecord r = run.water->record(false);
+  EXPECT_NEAR(contact_floor(run) / weight, 1, 0.02);
+  EXPECT_LT(std::max(r.most, -r.least), 0.02 * weight / bed.scene.area());
+}
+
+TEST_F(Seepage, LiftsTheBedAtTheCriticalGradient) {
+  WetRun below = under(0.95), above = under(1.05);
+  const double mean_0 = [&] {
+    double z = 0;
+    for (const Vec3d& x : bed.state.x) z += x.z / bed.state.size();
+    return z;
+  }();
+  const auto mean = [&](const WetRun& run) {
+    double z = 0;
+    const State s = run.engine->state();
+    for (const Vec3d& x : s.x) z += x.z / s.size();
+    return z;
+  };
+  below.advance(60000), above.advance(60000);
+  // 0.3 s: a bed that nothing holds rises by 1/2 0.05 g' t^2 = some cm, less what drag of the gap takes.
+  EXPECT_NEAR(mean(below), mean_0, 0.02 * 0.02);
+  EXPECT_GT(mean(above) - mean_0, 0.2 * 0.02);
+  EXPECT_NEAR(contact_floor(below) / weight, 0.05, 0.03);
+}
+
+TEST_F(Seepage, BedThatLiftsOffStaysFinite) {
+  WetRun run = under(3);
+  run.advance(60000);
+  const State s = run.engine->state();
+  for (const Vec3d& v : s.v) EXPECT_LT(dem::length(v), 10);
+  EXPECT_NEAR(run.water->record(false).balance / run.water->record(false).volume, 0, 1e-12);
+}
+
+// An elastic packing that swings, undrained, at the longest interval that is accepted.
+TEST(CoupledStability, EnergyDoesNotGrow) {
+  for (const double beta : {1e-7, 1e-8, 4.5e-10, 1e-11}) {
+    for (const TopSide top : {TopSide::impermeable, TopSide::drained}) {
+      WetBed bed = pressed_bed();
+      Scene& s = bed.scene;
+      s.grain.gamma_n = s.grain.gamma_t = s.wall.gamma_n = s.wall.gamma_t = 0;
+      s.grain.mu_s = s.grain.mu_d = s.wall.mu_s = s.wall.mu_d = 100;  // sticks
+      for (dem::Index i = 0; i < bed.state.size(); ++i)
+        bed.state.v[i] = {1e-5 * std::sin(1e3 * i), 1e-5 * std::sin(2e3 * i), 1e-5 * std::sin(3e3 * i)};
+      Water w = water_over(bed);
+      w.compressibility = beta, w.top = top, w.k_c = 1e-20;
+      if (top == TopSide::impermeable) w.sides = {};
+      if (beta == 1e-11) s.dt *= 0.5;
+      WetRun run(bed, w);
+      const auto total = [&] {
+        const State now = run.engine->state();
+        return dem::observe(run.scene, now).energy.kinetic;
+      };
+      const double start = total();
+      double largest = 0;
+      for (int k = 0; k < 20; ++k) run.advance(5000), largest = std::max(largest, total());
+      // Of what was put in as motion half goes into springs and water and comes back.
+      EXPECT_LT(largest, 1.05 * start) << "beta " << beta << ", m " << run.scene.exchange_interval;
+    }
+  }
+}
+
+TEST(CoupledStability, RefusesWhatIsNotAndSaysWhatIs) {
+  Water w = water_over(pressed_bed());
+  w.interval = 1000;
+  const auto message = [&] {
+    try {
+      WetRun run(pressed_bed(), w);
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string("accepted");
+  };
+  const std::string refused = message();
+  EXPECT_NE(refused.find("fluid.exchange_interval = 1000: unstable; expected at most "), std::string::npos)
+      << refused;
+  w.interval = 0;
+  w.compressibility = 1e-14;
+  EXPECT_NE(message().find("unstable even with an exchange at each; expected a step of at most "),
+            std::string::npos)
+      << message();
+}
+
+// From tight to open and from soft to stiff water, in a bed that is sheared.
+TEST(CoupledStability, AnyPermeabilityAndCompressibility) {
+  for (const double beta : {1e-7, 4.5e-10, 1e-11})
+    for (const double k : {1e-9, 1e-12, 1e-15, 1e-20}) {
+      WetBed bed = pressed_bed();
+      for (dem::Index i = 0; i < bed.state.size(); ++i) bed.state.v[i].x = 0.2 * bed.state.x[i].z;
+      if (beta == 1e-11) bed.scene.dt *= 0.5;
+      Water w = water_over(bed);
+      w.compressibility = beta, w.k_c = k;
+      WetRun run(bed, w);
+      run.advance(4000);
+      const WaterRecord r = run.water->record(false);
+      EXPECT_LT(std::max(r.most, -r.least), 1e7);
+      EXPECT_NEAR(r.balance / r.volume, 0, 1e-12);
+    }
+}
+
+// Affine shear at constant volume moves solids through faces but changes no cell's content.
+TEST(FalseDivergence, OfAffineShearIsSmall) {
+  const auto pressure = [](bool sheared) {
+    WetBed bed = tall_bed();
+    bed.scene.grain = bed.scene.wall = {1e-6, 0, 0, 0, 0, 0};
+    bed.scene.top_wall = {};
+    bed.scene.floor = false;
+    const double rate = 1;
+    for (dem::Index i = 0; i < bed.state.size(); ++i)
+      bed.state.v[i] = {(sheared ? rate : 0) * bed.state.x[i].z, 0, sheared ? 0 : -rate * bed.state.x[i].z};
+    Water w = water_over(bed, bed.state.wall_z);
+    w.sides = {};
+    WetRun run(bed, w);
+    run.advance(20);
+    const WaterFields f = run.water->fields();
+    double sum = 0;
+    for (const double p : f.pressure) sum += p * p;
+    return std::sqrt(sum / f.pressure.size());
+  };
+  // The same rate of compression makes so much; of shear, a thousandth of it is left (1 % with plain hats).
+  EXPECT_LT(pressure(true) / pressure(false), 2e-3);
+}
+
+}  // namespace
+}  // namespace moraine::coupling

@@ -1,0 +1,71 @@
+// The same bits for any number of threads, on the GPU's loop, and after a restart.
+#include "wet_scenes.hpp"
+
+namespace moraine::coupling {
+namespace {
+
+struct End {
+  State state;
+  WaterState water;
+};
+
+WetBed sheared() {
+  WetBed bed = pressed_bed();
+  for (dem::Index i = 0; i < bed.state.size(); ++i) bed.state.v[i] = {2 * bed.state.x[i].z, 0.1, 0};
+  return bed;
+}
+
+void expect_same(const End& a, const End& b) {
+  const auto same = [](const auto& p, const auto& q) {
+    return p.size() == q.size() && std::memcmp(p.data(), q.data(), p.size() * sizeof p[0]) == 0;
+  };
+  EXPECT_TRUE(same(a.state.x, b.state.x));
+  EXPECT_TRUE(same(a.state.v, b.state.v));
+  EXPECT_TRUE(same(a.state.omega, b.state.omega));
+  EXPECT_TRUE(same(a.state.force, b.state.force));
+  EXPECT_TRUE(same(a.state.water_force, b.state.water_force));
+  EXPECT_TRUE(same(a.water.q, b.water.q));
+  EXPECT_TRUE(same(a.water.p, b.water.p));
+  EXPECT_EQ(a.state.ledger.water, b.state.ledger.water);
+  EXPECT_EQ(a.state.ledger.viscous, b.state.ledger.viscous);
+  EXPECT_EQ(a.state.wall_z, b.state.wall_z);
+  EXPECT_EQ(a.water.drained_top, b.water.drained_top);
+}
+
+End after(WetRun&& run, int steps) {
+  run.advance(steps);
+  return {run.engine->state(), run.water->state()};
+}
+
+TEST(SameBitsInWater, ForAnyThreadsAndOnTheGpusLoop) {
+  for (const std::int64_t m : {1, 2}) {
+    Water w = water_over(sheared());
+    w.interval = m, w.k_c = 1e-11;
+    const End one = after(WetRun(sheared(), w), 1500);
+    EXPECT_GT(one.water.exchanges, 100);
+    expect_same(one, after(WetRun(sheared(), w, {}, dem::Backend::cpu, 2), 1500));
+    expect_same(one, after(WetRun(sheared(), w, {}, dem::Backend::cpu, 4), 1500));
+    expect_same(one, after(WetRun(sheared(), w, {}, dem::Backend::reference, 2), 1500));
+  }
+}
+
+TEST(SameBitsInWater, AfterARestart) {
+  for (const std::int64_t m : {1, 2}) {
+    Water w = water_over(sheared());
+    w.interval = m, w.k_c = 1e-11, w.top = TopSide::impermeable, w.sides = {};
+    const End whole = after(WetRun(sheared(), w), 1500);
+    for (const int at : {100, 300, 900}) {
+      WetRun first(sheared(), w);
+      first.advance(at);
+      const End half{first.engine->state(), first.water->state()};
+      const auto water = make_pore_water(w, first.scene, half.state, half.water, true);
+      const auto engine = dem::make_engine(dem::Backend::cpu, 1);
+      engine->load(first.scene, half.state, water.get());
+      engine->advance(1500 - at);
+      expect_same(whole, {engine->state(), water->state()});
+    }
+  }
+}
+
+}  // namespace
+}  // namespace moraine::coupling
