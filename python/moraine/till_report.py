@@ -60,7 +60,7 @@ class Run:
 
     @cached_property
     def friction(self):
-        return water_figures.total_friction(self.rows)
+        return water_figures.total_friction(self.rows, self.wet)
 
     @cached_property
     def _smooth_peak(self):

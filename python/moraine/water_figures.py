@@ -11,8 +11,9 @@ from .style import lines, page, panel, plt
 width = 0.01    # of shear strain, over which curves are smoothed
 
 
-def total_friction(rows):
-    return rows["total_friction" if "total_friction" in rows else "shear_friction"]
+def total_friction(rows, wet):
+    """`wet`: whether the stage of these rows has water; a dry stage of a wet case has the column, but nothing in it."""
+    return rows["total_friction" if wet else "shear_friction"]
 
 
 def curve(rows, values):
@@ -32,12 +33,12 @@ def unit_of(pressures):
 
 
 def pressure_label(unit):
-    return f"water pressure, shear zone ({unit})"
+    return f"pressure, shear zone ({unit})"
 
 
 def shear(stages, labels):
     """Stages beside each other, such as a wet one and its dry twin: total friction, friction of the grains, pressure, dilation."""
-    figure, axes = plt.subplots(2, 2, figsize=(page, 4.4), sharex=True, gridspec_kw={"hspace": 0.16, "wspace": 0.3})
+    figure, axes = plt.subplots(2, 2, figsize=(page, 4.4), sharex=True, gridspec_kw={"hspace": 0.2, "wspace": 0.26})
     (total, grains), (pressure, dilation) = axes
     series = [s.series for s in stages]
     wet = [r for s, r in zip(stages, series) if s.wet]
@@ -45,7 +46,7 @@ def shear(stages, labels):
     highest = 0.0
     for stage, rows, label, colour in zip(stages, series, labels, plt.rcParams["axes.prop_cycle"].by_key()["color"]):
         look = {"color": colour, "linestyle": "-" if stage.wet else "--", "label": label or None}
-        strain, friction = curve(rows, total_friction(rows))
+        strain, friction = curve(rows, total_friction(rows, stage.wet))
         highest = max(highest, friction.max())
         total.plot(strain, friction, **look)
         grains.plot(*curve(rows, rows["shear_friction"]), **look)
@@ -58,11 +59,11 @@ def shear(stages, labels):
         total.set_ylim(0.1)
     else:
         total.set_ylim(0)
-    total.set_ylabel("shear stress over total stress $\\tau/\\sigma$")
-    grains.set_ylabel("shear stress over that of the grains $\\tau/\\sigma'$")
+    total.set_ylabel("total friction $\\tau/\\sigma$")
+    grains.set_ylabel("friction of the grains $\\tau/\\sigma'$")
     grains.set_ylim(0)
     pressure.set_ylabel(pressure_label(unit))
-    dilation.set_ylabel("dilation (mean grain diameters)")
+    dilation.set_ylabel("dilation (diameters)")
     for ax in (pressure, dilation):
         ax.axhline(0, color="0.6", lw=0.5, zorder=0)
         ax.set_xlabel("shear strain $\\gamma$")
@@ -100,7 +101,7 @@ def pressure(stage):
     unit, size = unit_of(levels)
     levels = levels / size
     reach = np.abs(levels).max() or 1.0
-    figure, (field, profiles) = plt.subplots(1, 2, figsize=(page, 2.8), sharey=True, layout="constrained", width_ratios=(1.7, 1))
+    figure, (field, profiles) = plt.subplots(1, 2, figsize=(page, 2.8), sharey=True, layout="constrained", width_ratios=(1.8, 1))
 
     middle = (times[1:] + times[:-1]) / 2
     edges = np.r_[times[0], middle, times[-1]]  # each snapshot stands for the time around it
@@ -122,7 +123,7 @@ def pressure(stage):
         profiles.plot(levels[k], centres, ms=3, mew=0.6, mfc="white", label=f"{times[k]:.3g} s", **look)
     profiles.axvline(0, color="0.6", lw=0.5, zorder=0)
     profiles.set_xlabel(f"water pressure ({unit})")
-    profiles.legend(loc="best")
+    profiles.legend(loc="center left", bbox_to_anchor=(1, 0.5))
     field.text(-0.12, 1.02, "(a)", transform=field.transAxes, fontweight="bold", ha="right")
     panel(profiles, "b")
     return figure
@@ -162,7 +163,7 @@ def hardening(runs):
     for (k_c, own), (friction, pressure) in zip(groups, axes):
         for run in dry + own:
             look = {"color": colours[run.rate], "linestyle": "-" if run.wet else (0, (3, 1.5)), "lw": 1.0 if run.wet else 0.8}
-            friction.plot(*curve(run.rows, total_friction(run.rows)), **look)
+            friction.plot(*curve(run.rows, total_friction(run.rows, run.wet)), **look)
             if run.wet:
                 pressure.plot(*curve(run.rows, run.rows["water_pressure_mean"] / size), **look)
         pressure.axhline(0, color="0.6", lw=0.5, zorder=0)
@@ -202,7 +203,7 @@ def dilation(runs):
         ax.set_title(k_c_title(k_c), loc="right", fontsize=7)
         panel(ax, letter)
     axes[0, 0].set_xlim(0)
-    axes[0, 0].set_ylabel("dilation (mean grain diameters)")
+    axes[0, 0].set_ylabel("dilation (diameters)")
     rate_legend(figure, colours, dry)
     figure.subplots_adjust(bottom=0.22)
     return figure
