@@ -16,6 +16,7 @@ from .strength import smoothed
 follow_up = {0.01: 0.62, 0.1: 0.65, 1.0: 0.71}
 follow_up_mu = 0.5
 
+root = Path(__file__).resolve().parents[2]
 last = 0.9      # of the strain at the end: where the mean of the end begins
 
 
@@ -108,7 +109,7 @@ def load(directories, note):
     runs = []
     for name, directory in directories.items():
         try:
-            if not (Path(directory) / "case.toml").exists():
+            if not (Path(directory) / "output" / "case.toml").exists():
                 raise MissingData("it has not been run")
             run = Run(name, Case(directory))
         except MissingData as why:
@@ -191,6 +192,7 @@ def build(directories, output, say=print):
     output = Path(output)
 
     def note(why):
+        why = why.replace(f"{root}/", "")  # what the report names is found in any copy of the tree
         notes.append(why)
         say(why)
 

@@ -184,7 +184,9 @@ def rate_legend(figure, colours, dry):
     handles = [plt.Line2D([], [], color=c, label=f"{rate:g} 1/s") for rate, c in colours.items()]
     if dry:
         handles.append(plt.Line2D([], [], color="0.3", linestyle=(0, (3, 1.5)), lw=0.8, label="dry, same rate"))
-    figure.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=len(handles))
+    height = figure.get_figheight()
+    figure.subplots_adjust(bottom=0.6 / height)
+    figure.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, 0.24 / height), ncol=len(handles))
 
 
 def dilation(runs):
@@ -205,7 +207,6 @@ def dilation(runs):
     axes[0, 0].set_xlim(0)
     axes[0, 0].set_ylabel("dilation (diameters)")
     rate_legend(figure, colours, dry)
-    figure.subplots_adjust(bottom=0.22)
     return figure
 
 
@@ -230,7 +231,8 @@ def peaks(runs):
     left.minorticks_off()
     left.set_xlabel("shear strain rate (1/s)")
     left.set_ylabel("peak total friction (smoothed)")
-    left.legend(loc="best")
+    handles, labels = left.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, -0.04), ncol=len(handles))
     right.axhline(1, color="0.6", lw=0.5, zorder=0)
     right.set_xlabel("$\\mu_f \\dot{\\gamma} H^2 / (k \\sigma_0)$")
     right.set_ylabel("peak over that of the dry twin")

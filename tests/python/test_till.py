@@ -4,41 +4,19 @@ from pathlib import Path
 import sys
 import tomllib
 
-import h5py
 import numpy as np
 import pytest
 
-from fake_case import FakeCase, stage
+import fake_wet_case
+from fake_wet_case import height
 from moraine import figures, till, till_report, water_figures
 from moraine.__main__ import main
 from moraine.case import Case, MissingData
 
-cells, height = (3, 3, 4), 0.8
-water = {"viscosity": 1.8e-3, "compressibility": 4.5e-10, "permeability_factor": 3.5e-9}
 
-
-def fake(directory, wet=True, rate=0.05, k_c=3.5e-9, snapshots=4, rows=None, peak=1.0):
-    """A shear stage to a strain of 0.3. Wet: water that falls by 2 kPa at the peak of friction, `peak` times as high as a dry bed's, and
-    snapshots whose pressure is -1000 Pa x the number of the level x that of the snapshot."""
-    case = FakeCase(directory, [stage("shear", "shear", strain=0.3, strain_rate=rate, normal_stress=20e3, mu_s=0.3, fluid=wet)],
-                    fluid=water | {"enabled": wet, "permeability_factor": k_c})
-    history = case.history(interval=0.001 / rate, height=height)
-    strain = history["shear_strain"]
-    history["total_friction"] = peak * history["shear_friction"]
-    history["water_pressure_mean"] = -2e3 * strain / 0.05 * np.exp(1 - strain / 0.05)
-    case.write(history[:rows])
-    if rows is None:
-        case.finish()
-    (case.output / "snapshots").mkdir()
-    for k in range(snapshots):
-        with h5py.File(case.output / f"snapshots/01-shear-{k:06d}.h5", "w") as h5:
-            h5.attrs.update({"time": 1.0 * k, "stage_time": 1.0 * k, "box": [0.3, 0.3, 0.0], "top_wall": height})
-            h5["grains/radius"] = np.full(5, 0.02)
-            if wet:
-                group = h5.create_group("water")
-                group.attrs.update({f"cells_{axis}": n for axis, n in zip("xyz", cells)} | {"size": [0.3, 0.3, height + 0.01 * k]})
-                group["pressure"] = -1000.0 * k * np.repeat(np.arange(1, cells[2] + 1), cells[0] * cells[1])
-                group["flux"] = np.zeros((np.prod(cells), 3))
+def fake(directory, **what):
+    """See fake_wet_case.py."""
+    fake_wet_case.write(directory, **what)
     return Case(directory)
 
 
@@ -146,17 +124,17 @@ def test_cases_set_only_what_differs(home):
 
 program = """#!{python}
 import sys
-sys.path[:0] = [{tests!r}, {package!r}]
+sys.path.insert(0, {tests!r})
 from pathlib import Path
-import test_till
+import shutil
+import fake_wet_case
 words, directory = sys.argv[1:], Path(sys.argv[2])
 with Path({calls!r}).open("a") as calls:
     print(*words, file=calls)
 if "3.5e-8+rate-0.1" in directory.name and {fails}:
     sys.exit("moraine: it went wrong")
-import shutil
 shutil.rmtree(directory / "output", ignore_errors=True)
-test_till.fake(directory, wet="dry" not in directory.name, snapshots=2)
+fake_wet_case.write(directory, wet="dry" not in directory.name, snapshots=2)
 """
 
 
@@ -169,9 +147,7 @@ def calls(tmp_path, monkeypatch):
     def use(fails=None):
         if fails is None:
             return file.read_text().splitlines() if file.exists() else []
-        here = Path(__file__).resolve()
-        script.write_text(program.format(python=sys.executable, tests=str(here.parent), package=str(here.parents[2] / "python"),
-                                         calls=str(file), fails=fails))
+        script.write_text(program.format(python=sys.executable, tests=str(Path(__file__).resolve().parent), calls=str(file), fails=fails))
         script.chmod(0o755)
     use(False)
     return use
