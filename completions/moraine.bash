@@ -4,14 +4,14 @@ _moraine() {
   root=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/..
   for ((i = 1; i < COMP_CWORD; ++i)); do
     case ${COMP_WORDS[i]} in
-      run | sweep | check | keys | bench | import-sphere | watch | figures | report | reproduce | test)
+      run | sweep | check | keys | bench | import-sphere | watch | figures | report | till | reproduce | test)
         command=${COMP_WORDS[i]}
         break
         ;;
     esac
   done
   case $command in
-    '') words="run sweep check keys bench import-sphere watch figures report reproduce test --help --version --cuda" ;;
+    '') words="run sweep check keys bench import-sphere watch figures report till reproduce test --help --version --cuda" ;;
     run) words="--resume --force --quiet --set --backend --threads --help" ;;
     sweep) words="--resume --force --quiet --set --at-once --backend --threads --help" ;;
     check) words="--set --backend --threads --help" ;;
@@ -19,6 +19,13 @@ _moraine() {
     watch) words="--interval --once --time --png --no-png --help" ;;
     figures) words="--output --format --only --help" ;;
     report) words="--output --notes --help" ;;
+    till)
+      case ${COMP_WORDS[i + 1]} in
+        "$word") words="quick hardening report --help" ;;
+        report) words="--output --help" ;;
+        *) words="--at-once --help" ;;
+      esac
+      ;;
     reproduce) words="--preset --seeds --quick --set --settled --output --cores --gpu --dry-run --help" ;;
     import-sphere | keys) words="--help" ;;
   esac
@@ -28,7 +35,7 @@ _moraine() {
     --set | --at-once | --threads | --steps | --stage | --interval | --format | --only | --seeds | --cores | --settled) return ;;
   esac
   COMPREPLY=()
-  if [[ ! $command || $word == -* || $previous == @(--backend|--preset) ]]; then
+  if [[ ! $command || $command == till && $previous != --output || $word == -* || $previous == @(--backend|--preset) ]]; then
     mapfile -t COMPREPLY < <(compgen -W "$words" -S ' ' -- "$word")
   elif [[ $command == import-sphere || $previous == @(--png|--output|--notes) ]]; then
     compopt -o filenames +o nospace

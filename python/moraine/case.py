@@ -76,6 +76,7 @@ class Snapshot:
 
     grains: id, role (0 free, 1 lower layer, 2 driven layer), radius m, position m, displacement m, velocity m/s, spin rad/s,
     rotation rad, force N, pressure Pa. contacts, forces on grain i: i, j, point m, force_normal N, force_tangential N, overlap m.
+    water, by cell, x fastest: pressure Pa (over hydrostatic), porosity, permeability m2, flux m/s.
     """
 
     def __init__(self, file):
@@ -106,6 +107,20 @@ class Snapshot:
         if any(len(table) and not 0 <= table[k].min() <= table[k].max() < len(self.grains) for k in "ij"):
             raise MissingData(f"{table.file}: has contacts of grains that are not in the snapshot")
         return table
+
+    @cached_property
+    def water(self):
+        return self._group("water")
+
+    @cached_property
+    def water_grid(self):
+        """Cells along x, y, z, and the sides of the grid, m; its top is that of the bed, and it follows that."""
+        with _open(self.file) as h5:
+            try:
+                group = h5["water"].attrs
+                return tuple(int(group[f"cells_{axis}"]) for axis in "xyz"), np.array(group["size"], float)
+            except KeyError as why:
+                raise MissingData(f"{self.file}: there is no water in it: {why}") from None
 
     @property
     def area(self):
@@ -151,6 +166,11 @@ class Stage:
     @property
     def sheared(self):
         return self.kind in ("shear", "shear_stress")
+
+    @property
+    def wet(self):
+        """Whether there is pore water."""
+        return self.settings.get("fluid", False)
 
 
 class Case:

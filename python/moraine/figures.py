@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Callable
 import sys
 
-from . import bed_figures, force_figures, measure, style
+from . import bed_figures, force_figures, measure, style, water_figures
 from .case import Case, MissingData
 
 
@@ -35,6 +35,22 @@ class Selection:
     def sheared(self):
         return self.shear.snapshots[-1]
 
+    @property
+    def wet(self):
+        """Shear stages with pore water."""
+        return [s for c in self.cases for s in c.stages if s.sheared and s.wet]
+
+    @property
+    def wet_one(self):
+        if not self.wet:
+            raise MissingData("no case has a shear stage with pore water")
+        return min(self.wet, key=lambda s: s.case is not self.one)
+
+    @property
+    def figures(self):
+        """Those that concern these cases."""
+        return [f for f in all_figures if self.wet or not f.wet]
+
     def last(self, name):
         return float(self.shear.series[name][-1])
 
@@ -45,6 +61,7 @@ class Figure:
     caption: str
     draw: Callable[[Selection], object]  # gives a Matplotlib figure
     many: bool = False  # whether it makes sense only for several normal stresses
+    wet: bool = False   # whether it makes sense only with pore water
 
 
 all_figures = (
@@ -76,6 +93,11 @@ all_figures = (
     Figure("consolidation", "Consolidation: volumetric strain, and what is still to come of it, with exponential fits to the collapse of the "
            "loose top and to the creep after it (par. 29).", lambda s: bed_figures.consolidation(s.cases)),
     Figure("sheared-bed", "The bed, the displacement in it, its friction and its dilation.", lambda s: force_figures.sheared_bed(s.one)),
+    Figure("water-shear", "Shear in water: shear stress over what grains and water together press on the wall, over what the grains alone press on "
+           "it, pressure of the water in the shear zone, and dilation. Smoothed over a strain of 0.01.",
+           lambda s: water_figures.shear([s.wet_one], [""]), wet=True),
+    Figure("water-pressure", "Pressure of the water over hydrostatic, mean of each level of cells, with depth below the top wall and time.",
+           lambda s: water_figures.pressure(s.wet_one), wet=True),
 )
 
 
@@ -85,7 +107,7 @@ def draw(selection, directory, formats=("pdf", "svg", "png"), only=(), say=print
     if unknown:
         raise MissingData(f"no figure {', '.join(sorted(unknown))}; there are {', '.join(f.name for f in all_figures)}")
     missing = {}
-    for figure in all_figures:
+    for figure in all_figures if only else selection.figures:
         if figure.many and not only and len({c.normal_stress for c in selection.cases}) < 2:
             missing[figure.name] = "it needs cases of several normal stresses"
             say(f"{figure.name}: left out: {missing[figure.name]}")

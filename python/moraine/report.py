@@ -387,7 +387,7 @@ def build(study, output, notes=None, say=print):
     selection = figures.Selection(measured)
     text.paragraph(f"Where a figure shows one run, it is that of {selection.one.normal_stress / 1e3:g} kPa and seed {selection.one.seed}.")
     missing = figures.draw(selection, output / "figures", ("svg", "png", "pdf"), say=say)
-    for figure in figures.all_figures:
+    for figure in selection.figures:
         if figure.name in missing:
             text.paragraph(f"{figure.name} is not drawn: {missing[figure.name]}")
         else:

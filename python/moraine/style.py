@@ -38,14 +38,14 @@ def panel(axes, letter):
     axes.set_title(f"({letter})", loc="left", fontweight="bold", pad=4)
 
 
-def save(figure, stem, formats=("pdf", "svg", "png")):
-    """Writes STEM.pdf, .svg, .png and closes the figure. Returns the paths."""
+def save(figure, stem, formats=("pdf", "svg", "png"), dpi=None):
+    """Writes STEM.pdf, .svg, .png and closes the figure. Returns the paths. dpi: of the PNG."""
     stem = Path(stem)
     stem.parent.mkdir(parents=True, exist_ok=True)
     paths = []
     for kind in formats:
         path = stem.with_name(f"{stem.name}.{kind}")
-        figure.savefig(path, metadata={"Date": None} if kind == "svg" else {"CreationDate": None} if kind == "pdf" else None)
+        figure.savefig(path, dpi=dpi, metadata={"Date": None} if kind == "svg" else {"CreationDate": None} if kind == "pdf" else None)
         if kind == "png":  # 255 colours are enough, at a third of the size
             with Image.open(path) as image:
                 small = image.convert("RGB").quantize(255, dither=Image.Dither.FLOYDSTEINBERG)

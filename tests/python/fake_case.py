@@ -18,6 +18,7 @@ import numpy as np
 
 source = Path(__file__).resolve().parents[2] / "src/output/series.cpp"
 columns = re.findall(r'\{"(\w+)", "([^"]+)",\s*"([^"]+)"\}', source.read_text())  # (name, units, meaning)
+dry_columns = [name for name, _, _ in columns].index("wall_water_pressure")  # the rest is there where a stage has water
 row_type = np.dtype([(name, float) for name, _, _ in columns])
 
 
@@ -97,7 +98,8 @@ class FakeCase:
         aside = self.file.with_name("series.h5.tmp")
         with h5py.File(aside, "w", libver="latest") as h5:
             h5.attrs["program"] = "moraine"
-            for name, units, meaning in columns:
+            wet = any(s.get("fluid") for s in self.stages)
+            for name, units, meaning in columns if wet else columns[:dry_columns]:
                 dataset = h5.create_dataset(name, data=rows[name], maxshape=(None,), chunks=(256,))
                 dataset.attrs["units"], dataset.attrs["meaning"] = np.bytes_(units), np.bytes_(meaning)
         aside.replace(self.file)
@@ -122,7 +124,7 @@ class Writer:
 
     def append(self, rows):
         rows = np.atleast_1d(rows)
-        for name in rows.dtype.names:
+        for name in self.h5:
             dataset = self.h5[name]
             dataset.resize(len(dataset) + len(rows), 0)
             dataset[-len(rows):] = rows[name]

@@ -28,10 +28,18 @@ def test_commands():
     ("run", "--resume --force --quiet --set --backend --threads --help"),
     ("watch", "--interval --once --time --png --no-png --help"),
     ("figures", "--output --format --only --help"),
+    ("till quick", "--at-once --help"),
+    ("till hardening", "--at-once --help"),
+    ("till report", "--output --help"),
     ("reproduce", "--preset --seeds --quick --set --settled --output --cores --gpu --dry-run --help"),
 ])
 def test_options(command, options):
-    assert complete(command, "-") == options.split()
+    assert complete(*command.split(), "-") == options.split()
+
+
+def test_experiments_on_till():
+    assert complete("till", "") == ["quick", "hardening", "report", "--help"] and complete("till", "qu") == ["quick"]
+    assert complete("till", "quick", "--at-once", "") == [] and complete("till", "report", "--output", "READ") == ["README.md"]
 
 
 def test_cases():

@@ -1,0 +1,240 @@
+"""Figures of beds with pore water. Each function takes stages and gives a Matplotlib figure.
+
+Pressures are those over hydrostatic. Curves are smoothed over a shear strain of 0.01. Total friction is shear stress over what grains and
+water together press on the top wall; in a dry bed that is the shear friction."""
+import numpy as np
+
+from . import strength
+from .case import MissingData
+from .style import lines, page, panel, plt
+
+width = 0.01    # of shear strain, over which curves are smoothed
+
+
+def total_friction(rows, wet):
+    """`wet`: whether the stage of these rows has water; a dry stage of a wet case has the column, but nothing in it."""
+    return rows["total_friction" if wet else "shear_friction"]
+
+
+def curve(rows, values):
+    """Strain and smoothed values, with the first row as it is; rows too few to be smoothed stay as they are."""
+    strain = rows["shear_strain"]
+    mean = strength.smoothed(strain, values, width)
+    known = np.isfinite(mean)
+    if not known.any():
+        return strain, values
+    return np.r_[strain[0], strain[known]], np.r_[values[0], mean[known]]
+
+
+def unit_of(pressures):
+    """Name and size of the unit that suits these pressures (Pa)."""
+    largest = np.max(np.abs(pressures), initial=0.0)
+    return ("MPa", 1e6) if largest >= 1e6 else ("kPa", 1e3) if largest >= 1e3 else ("Pa", 1.0)
+
+
+def pressure_label(unit):
+    return f"pressure, shear zone ({unit})"
+
+
+def shear(stages, labels):
+    """Stages beside each other, such as a wet one and its dry twin: total friction, friction of the grains, pressure, dilation."""
+    figure, axes = plt.subplots(2, 2, figsize=(page, 4.4), sharex=True, gridspec_kw={"hspace": 0.2, "wspace": 0.26})
+    (total, grains), (pressure, dilation) = axes
+    series = [s.series for s in stages]
+    wet = [r for s, r in zip(stages, series) if s.wet]
+    unit, size = unit_of(np.concatenate([r["water_pressure_mean"] for r in wet]) if wet else [0.0])
+    highest = 0.0
+    for stage, rows, label, colour in zip(stages, series, labels, plt.rcParams["axes.prop_cycle"].by_key()["color"]):
+        look = {"color": colour, "linestyle": "-" if stage.wet else "--", "label": label or None}
+        strain, friction = curve(rows, total_friction(rows, stage.wet))
+        highest = max(highest, friction.max())
+        total.plot(strain, friction, **look)
+        grains.plot(*curve(rows, rows["shear_friction"]), **look)
+        dilation.plot(*curve(rows, rows["dilation_diameters"]), **look)
+        if stage.wet:
+            strain, mean = curve(rows, rows["water_pressure_mean"] / size)
+            pressure.plot(strain, mean, **look)
+    if highest > 5:
+        total.set_yscale("log")
+        total.set_ylim(0.1)
+    else:
+        total.set_ylim(0)
+    total.set_ylabel("total friction $\\tau/\\sigma$")
+    grains.set_ylabel("friction of the grains $\\tau/\\sigma'$")
+    grains.set_ylim(0)
+    pressure.set_ylabel(pressure_label(unit))
+    dilation.set_ylabel("dilation (diameters)")
+    for ax in (pressure, dilation):
+        ax.axhline(0, color="0.6", lw=0.5, zorder=0)
+        ax.set_xlabel("shear strain $\\gamma$")
+    total.set_xlim(0)
+    if any(labels):
+        total.legend(loc="best")
+    figure.align_ylabels()
+    for ax, letter in zip(axes.flat, "abcd"):
+        panel(ax, letter)
+    return figure
+
+
+def pressure_field(stage):
+    """Of the snapshots with water: stage times (s), heights of the grid (m), and the mean pressure of each level of cells (Pa),
+    a row for each snapshot, from the floor up."""
+    times, heights, levels = [], [], []
+    for snapshot in stage.snapshots:
+        try:
+            (_, _, count), size = snapshot.water_grid
+        except MissingData:
+            continue
+        times.append(snapshot.stage_time)
+        heights.append(size[2])
+        levels.append(snapshot.water["pressure"].reshape(count, -1).mean(axis=1))
+    if len(times) < 2:
+        raise MissingData(f"{stage.case.output}/snapshots: fewer than two snapshots of stage {stage.name} hold water")
+    if len({len(p) for p in levels}) > 1:
+        raise MissingData(f"{stage.case.output}/snapshots: the water's grid changes its number of levels within stage {stage.name}")
+    return np.array(times), np.array(heights), np.array(levels)
+
+
+def pressure(stage):
+    """Pressure with depth and time, and profiles at some of these times."""
+    times, heights, levels = pressure_field(stage)
+    unit, size = unit_of(levels)
+    levels = levels / size
+    reach = np.abs(levels).max() or 1.0
+    figure, (field, profiles) = plt.subplots(1, 2, figsize=(page, 2.8), sharey=True, layout="constrained", width_ratios=(1.8, 1))
+
+    middle = (times[1:] + times[:-1]) / 2
+    edges = np.r_[times[0], middle, times[-1]]  # each snapshot stands for the time around it
+    depth = np.linspace(1, 0, levels.shape[1] + 1)[:, None] * np.interp(edges, times, heights)
+    mesh = field.pcolormesh(np.broadcast_to(edges, depth.shape), depth, levels.T, cmap="RdBu_r", vmin=-reach, vmax=reach, rasterized=True)
+    figure.colorbar(mesh, ax=field, label=f"water pressure ({unit})", pad=0.02)
+    field.set_xlabel("time since the stage began (s)")
+    field.set_ylabel("depth below the top wall (m)")
+    field.set_ylim(heights.max(), 0)
+    rows = stage.series
+    if stage.kind == "shear" and rows["stage_time"][-1] > 0:  # at an even rate
+        rate = rows["shear_strain"][-1] / rows["stage_time"][-1]
+        if rate > 0:
+            field.secondary_xaxis("top", functions=(lambda t: t * rate, lambda g: g / rate)).set_xlabel("shear strain $\\gamma$")
+
+    some = np.unique(np.linspace(0, len(times) - 1, 6).round().astype(int)[1:])
+    for k, look in zip(some, lines(len(some))):
+        centres = (np.arange(levels.shape[1], 0, -1) - 0.5) / levels.shape[1] * heights[k]
+        profiles.plot(levels[k], centres, ms=3, mew=0.6, mfc="white", label=f"{times[k]:.3g} s", **look)
+    profiles.axvline(0, color="0.6", lw=0.5, zorder=0)
+    profiles.set_xlabel(f"water pressure ({unit})")
+    profiles.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    field.text(-0.12, 1.02, "(a)", transform=field.transAxes, fontweight="bold", ha="right")
+    panel(profiles, "b")
+    return figure
+
+
+def look_of(rates):
+    """{rate: colour}"""
+    return dict(zip(rates, (x["color"] for x in lines(len(rates)))))
+
+
+def by_permeability(runs):
+    """[(k_c, runs)] from the most permeable on, and the dry runs."""
+    factors = sorted({r.k_c for r in runs if r.wet}, reverse=True)
+    return [(k, sorted((r for r in runs if r.wet and r.k_c == k), key=lambda r: r.rate)) for k in factors], \
+        sorted((r for r in runs if not r.wet), key=lambda r: r.rate)
+
+
+def scientific(value):
+    mantissa, _, exponent = f"{value:.3g}".partition("e") if value == 0 or 1e-3 <= abs(value) < 1e4 else f"{value:.1e}".partition("e")
+    return f"{mantissa} \\times 10^{{{int(exponent)}}}" if exponent else mantissa
+
+
+def k_c_title(k_c):
+    return f"$k_c = {scientific(k_c)}$ m²"
+
+
+def hardening(runs):
+    """Total friction and pressure in the shear zone against strain: a row for each permeability, a colour for each rate. `runs`: of
+    till_report.Run."""
+    groups, dry = by_permeability(runs)
+    if not groups:
+        raise MissingData("no wet run has results")
+    colours = look_of(sorted({r.rate for r in runs}))
+    figure, axes = plt.subplots(len(groups), 2, figsize=(page, 0.5 + 1.9 * len(groups)), sharex=True, sharey="col", squeeze=False,
+                                gridspec_kw={"hspace": 0.22, "wspace": 0.26})
+    unit, size = unit_of(np.concatenate([r.rows["water_pressure_mean"] for _, own in groups for r in own]))
+    for (k_c, own), (friction, pressure) in zip(groups, axes):
+        for run in dry + own:
+            look = {"color": colours[run.rate], "linestyle": "-" if run.wet else (0, (3, 1.5)), "lw": 1.0 if run.wet else 0.8}
+            friction.plot(*curve(run.rows, total_friction(run.rows, run.wet)), **look)
+            if run.wet:
+                pressure.plot(*curve(run.rows, run.rows["water_pressure_mean"] / size), **look)
+        pressure.axhline(0, color="0.6", lw=0.5, zorder=0)
+        friction.set_ylabel("total friction $\\tau/\\sigma$")
+        pressure.set_ylabel(pressure_label(unit))
+        pressure.set_title(k_c_title(k_c), loc="right", fontsize=7)
+    axes[0, 0].set_ylim(0), axes[0, 0].set_xlim(0)
+    for ax in axes[-1]:
+        ax.set_xlabel("shear strain $\\gamma$")
+    for ax, letter in zip(axes.flat, "abcdefghijklmnop"):
+        panel(ax, letter)
+    rate_legend(figure, colours, dry)
+    figure.align_ylabels()
+    return figure
+
+
+def rate_legend(figure, colours, dry):
+    handles = [plt.Line2D([], [], color=c, label=f"{rate:g} 1/s") for rate, c in colours.items()]
+    if dry:
+        handles.append(plt.Line2D([], [], color="0.3", linestyle=(0, (3, 1.5)), lw=0.8, label="dry, same rate"))
+    height = figure.get_figheight()
+    figure.subplots_adjust(bottom=0.6 / height)
+    figure.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, 0.24 / height), ncol=len(handles))
+
+
+def dilation(runs):
+    """Dilation against strain: a panel for each permeability."""
+    groups, dry = by_permeability(runs)
+    if not groups:
+        raise MissingData("no wet run has results")
+    colours = look_of(sorted({r.rate for r in runs}))
+    figure, axes = plt.subplots(1, len(groups), figsize=(page, 2.4), sharex=True, sharey=True, squeeze=False, gridspec_kw={"wspace": 0.1})
+    for (k_c, own), ax, letter in zip(groups, axes[0], "abcdefgh"):
+        for run in dry + own:
+            ax.plot(*curve(run.rows, run.rows["dilation_diameters"]), color=colours[run.rate], linestyle="-" if run.wet else (0, (3, 1.5)),
+                    lw=1.0 if run.wet else 0.8)
+        ax.axhline(0, color="0.6", lw=0.5, zorder=0)
+        ax.set_xlabel("shear strain $\\gamma$")
+        ax.set_title(k_c_title(k_c), loc="right", fontsize=7)
+        panel(ax, letter)
+    axes[0, 0].set_xlim(0)
+    axes[0, 0].set_ylabel("dilation (diameters)")
+    rate_legend(figure, colours, dry)
+    return figure
+
+
+def peaks(runs):
+    """Peak total friction against rate for each permeability; and over that of the dry twin, against the group mu rate H^2/(k sigma_0).
+    `runs`: those that have come to their end."""
+    groups, dry = by_permeability(runs)
+    if not groups:
+        raise MissingData("no wet run has come to its end")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(page, 2.7), gridspec_kw={"wspace": 0.28})
+    alone = {r.rate: r.peak for r in dry}
+    for (k_c, own), look in zip(groups, lines(len(groups))):
+        look |= {"ms": 4, "mew": 0.8, "mfc": "white"}
+        left.plot([r.rate for r in own], [r.peak for r in own], label=k_c_title(k_c), **look)
+        if pairs := [(r.group, r.peak / alone[r.rate]) for r in own if r.rate in alone]:
+            right.plot(*zip(*pairs), **look)
+    if dry:
+        left.plot(list(alone), list(alone.values()), "x--", color="0.35", ms=4, mew=0.8, label="dry")
+    left.set_xscale("log"), right.set_xscale("log")
+    rates = sorted({r.rate for r in runs})
+    left.set_xticks(rates, [f"{x:g}" for x in rates])
+    left.minorticks_off()
+    left.set_xlabel("shear strain rate (1/s)")
+    left.set_ylabel("peak total friction (smoothed)")
+    handles, labels = left.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, -0.04), ncol=len(handles))
+    right.axhline(1, color="0.6", lw=0.5, zorder=0)
+    right.set_xlabel("$\\mu_f \\dot{\\gamma} H^2 / (k \\sigma_0)$")
+    right.set_ylabel("peak over that of the dry twin")
+    panel(left, "a"), panel(right, "b")
+    return figure
