@@ -142,7 +142,10 @@ class Integration {
     return 0;
   }
   static void keep_message(int code, const char*, const char* where, char* text, void* data) {
-    if (code < 0) self(data).message_ = std::string(where) + ": " + text;
+    if (code >= 0) return;
+    std::string& message = self(data).message_;
+    message = std::string(where) + ": " + text;
+    if (message.ends_with('.')) message.pop_back();
   }
 
   Evolved statistics() const {
