@@ -147,6 +147,11 @@ void Darcy::apply(double s, const double* p, double* out) const {
   sweep<true>(s, Beyond{{0, 0}, {zero, zero}, {zero, zero}}, p, out);
 }
 
+void Darcy::apply_flow(double s, const double* p, double* out) const {
+  const double* zero = zeros_.data();
+  sweep<false>(s, Beyond{{0, 0}, {zero, zero}, {zero, zero}}, p, out);
+}
+
 void Darcy::diagonal(double s, double* out) const {
   std::copy(storage_.begin(), storage_.end(), out);
   for (int a = 0; a < 3; ++a)

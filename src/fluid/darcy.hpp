@@ -26,9 +26,10 @@ class Darcy {
   const std::vector<double>& storage() const { return storage_; }
   const std::vector<double>& transmissibility(int axis) const { return transmissibility_[axis]; }
 
-  void apply(double s, const double* p, double* out) const;  // out = (C + s L) p; s in s
-  void diagonal(double s, double* out) const;                // of C + s L
-  void add_sides(double s, double t, double* out) const;     // out += s b(t)
+  void apply(double s, const double* p, double* out) const;       // out = (C + s L) p; s in s
+  void apply_flow(double s, const double* p, double* out) const;  // out = s L p
+  void diagonal(double s, double* out) const;                     // of C + s L
+  void add_sides(double s, double t, double* out) const;          // out += s b(t)
   // out = L p - b(t), m3/s that leave each cell. Both cells of a face see the same flux to the last bit.
   void outflow(double t, const double* p, double* out) const;
   void flux(int axis, double t, const double* p, double* out) const;  // m3/s, upwards along the axis

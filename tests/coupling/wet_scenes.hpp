@@ -51,10 +51,13 @@ inline WetBed make_bed(int count, int columns, double normal_stress) {
     state.wall_z = bed_top(state);
     state = dem::run(*engine, s, state, 60000);
     dem::synchronise(s, state);
-    s.grain.mu_s = s.grain.mu_d = 0.5;
+    // Locked, so that it is elastic and comes to rest: sliding contacts creep for long.
+    s.grain.mu_s = s.grain.mu_d = s.wall.mu_s = s.wall.mu_d = 100;
+    s.grain.gamma_n = s.grain.gamma_t = s.wall.gamma_n = s.wall.gamma_t = 150;
     stop(state);
-    state = dem::run(*engine, s, state, 20000);
+    state = dem::run(*engine, s, state, 60000);
     dem::synchronise(s, state);
+    s.grain.gamma_n = s.wall.gamma_n = 50, s.grain.gamma_t = s.wall.gamma_t = 20;
     stop(state);
   }
   dem::sort_spatially(s, state);
@@ -69,7 +72,7 @@ inline const WetBed& pressed_bed() {
 }
 // A column for one-dimensional problems: as many, 0.11 m wide and half a metre high.
 inline const WetBed& tall_bed() {
-  static const WetBed bed = make_bed(900, 5, 1e4);
+  static const WetBed bed = make_bed(1200, 5, 1e4);
   return bed;
 }
 inline const WetBed& heavy_bed() {  // settled, without a wall

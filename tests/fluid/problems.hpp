@@ -1,4 +1,4 @@
-// Media, random numbers and norms that the tests of pore water share.
+// Random numbers and norms that the tests of pore water share.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "error.hpp"
-#include "fluid/step.hpp"
+#include "fluid/known_answers.hpp"
 
 namespace moraine::fluid {
 
@@ -28,23 +28,6 @@ class Random {
  private:
   std::mt19937_64 engine_;
 };
-
-inline Medium uniform(const Grid& grid, double porosity, double permeability) {
-  Medium m;
-  m.porosity.assign(grid.cells(), porosity);
-  m.permeability.assign(grid.cells(), permeability);
-  return m;
-}
-
-inline double diffusivity(const Medium& m) {  // m2/s, of the first cell
-  return m.permeability[0] / (m.viscosity * m.porosity[0] * m.compressibility);
-}
-
-inline Side pressure_side(double value) {
-  Side s;
-  s.kind = Side::Kind::pressure, s.value = value;
-  return s;
-}
 
 inline double largest(const std::vector<double>& v) {
   double m = 0;
