@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 
 #include "case/keys.hpp"
 #include "case/preset.hpp"
@@ -56,7 +55,6 @@ class Reader {
   double number(const string& key) const { return std::get<double>(entries_.at(key).value); }
   string text(const string& key) const { return std::get<string>(entries_.at(key).value); }
   bool flag(const string& key) const { return std::get<bool>(entries_.at(key).value); }
-  bool is_word(const string& key) const { return std::holds_alternative<string>(entries_.at(key).value); }
   bool automatic_dt() const { return std::holds_alternative<string>(entries_.at("model.dt").value); }
 
   template <class... Parts>
@@ -67,43 +65,6 @@ class Reader {
  private:
   const Entries& entries_;
 };
-
-// `kind`: the key of a side of the water; its values belong to their kinds.
-void check_water_side(const Reader& reader, const string& kind, const string& pressure, const string& flux) {
-  for (const auto& [value, needed, unit] : {std::tuple{pressure, "pressure", " Pa"}, {flux, "flux", " m/s"}})
-    reader.expect(reader.number(value) == 0 || reader.text(kind) == needed, value, "0", unit, ": ",
-                  kind.substr(kind.find('.') + 1), " is ", reader.text(kind), ", not ", needed);
-}
-
-void check_fluid(const Reader& c) {
-  c.expect(c.number("fluid.porosity_max") <= 1, "fluid.porosity_max", "at most 1");
-  c.expect(c.number("fluid.porosity_min") < c.number("fluid.porosity_max"), "fluid.porosity_min",
-           "less than fluid.porosity_max = ", c.number("fluid.porosity_max"));
-  for (const string side : {"x_low", "x_high", "y_low", "y_high"}) {
-    const string key = "fluid." + side;
-    c.expect(c.text(key) == "no_flow" || c.text("box.periodic").find(side[0]) == string::npos, key,
-             "no_flow: ", side[0], " is periodic (box.periodic = \"", c.text("box.periodic"),
-             "\") and has no sides");
-    check_water_side(c, key, key + "_pressure", key + "_flux");
-  }
-}
-
-void check_water(const Reader& s, const Reader& c, bool has_top_wall) {
-  if (!s.flag("stage.fluid")) return;
-  c.expect(!c.is_word("model.dt"), "model.dt", "a fixed step: the exchange with pore water needs one");
-  c.expect(c.text("box.periodic").find('z') == string::npos, "box.periodic",
-           "no z: pore water has a floor and a top");
-  const bool drained = s.text("stage.fluid_top") == "drained";
-  s.expect(drained || has_top_wall, "stage.fluid_top", "drained: this stage has no top wall");
-  for (const string key : {"stage.top_pressure", "stage.top_pressure_amplitude"})
-    s.expect(drained || s.number(key) == 0, key, "0 Pa: fluid_top is impermeable");
-  if (s.number("stage.top_pressure_amplitude") != 0)
-    s.expect(s.number("stage.top_pressure_frequency") > 0, "stage.top_pressure_frequency",
-             "> 0 Hz with an amplitude");
-  for (const string key : {"stage.top_pressure_frequency", "stage.top_pressure_phase"})
-    s.expect(drained || s.number(key) == 0, key, "0: fluid_top is impermeable");
-  check_water_side(s, "stage.fluid_bottom", "stage.bottom_pressure", "stage.bottom_flux");
-}
 
 void check_case(const Entries& entries) {
   const Reader c(entries);
@@ -121,7 +82,6 @@ void check_case(const Entries& entries) {
     c.expect(c.number("box.z") > 0, "box.z", "> 0 m where z is periodic");
     c.expect(!c.flag("box.floor"), "box.floor", "false where z is periodic");
   }
-  check_fluid(c);
 }
 
 void check_water(const Reader& s, const Reader& above, bool no_wall) {
@@ -201,7 +161,6 @@ void check_stage(const Entries& entries, const Entries& above, const Context& co
   check_water(s, Reader(above), wall == "none" || (wall == "automatic" && kind == "settle"));
   s.expect(s.number("stage.mu_d") <= s.number("stage.mu_s"), "stage.mu_d",
            "at most mu_s = ", s.number("stage.mu_s"));
-  check_water(s, Reader(above), wall != "none" && (wall != "automatic" || kind != "settle"));
 }
 
 // The file that `start` names: itself, or the end of that case.
@@ -247,10 +206,6 @@ string text_of(const Draft& draft) {
 }  // namespace
 
 bool Case::has_water() const {
-  return std::any_of(stages.begin(), stages.end(), [](const Stage& s) { return s.fluid; });
-}
-
-bool Case::wet() const {
   return std::any_of(stages.begin(), stages.end(), [](const Stage& s) { return s.fluid; });
 }
 

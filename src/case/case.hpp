@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "coupling/water.hpp"
 #include "dem/scene.hpp"
 #include "dem/state.hpp"
 
@@ -69,11 +68,7 @@ struct Stage {
   double wall_mu;
   bool zero_kinematics;  // velocities, spins and rotations set to zero when the stage begins
   bool clear_history;    // tangential springs forgotten when the stage begins
-  bool fluid;            // pore water; what follows counts only with it
-  coupling::TopSide fluid_top;
-  double top_pressure, top_pressure_amplitude, top_pressure_frequency, top_pressure_phase;  // Pa, Hz, rad
-  WaterSide fluid_bottom;
-  bool fluid;  // pore water in this stage
+  bool fluid;            // pore water in this stage
   FluidTop fluid_top;
   double top_pressure, top_pressure_amplitude, top_pressure_frequency, top_pressure_phase;  // Pa, Hz, rad
   FluidBottom fluid_bottom;

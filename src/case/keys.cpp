@@ -79,10 +79,6 @@ std::vector<Key> make_keys() {
   constexpr auto output = &C::output;
   constexpr auto guards = &C::guards;
   using F = Fluid;
-  using W = WaterSide;
-  constexpr auto fluid = &C::fluid;
-  constexpr auto bottom = &S::fluid_bottom;
-  using F = Fluid;
   constexpr auto fluid = &C::fluid;
   const string sheared = "shear, shear_stress", damped = "; settle, consolidate: ";
   return {
@@ -148,35 +144,6 @@ std::vector<Key> make_keys() {
       row<fluid, &F::solver>("fluid.solver", "", "\"automatic\"", "automatic | pcg | cholmod", "for the pressure"),
       row<fluid, &F::tolerance>("fluid.tolerance", "1", "1e-10", "> 0", "of the residual over the right-hand side (pcg)"),
 
-      row<fluid, &F::enabled>("fluid.enabled", "", "false", "", "pore water in all stages; a stage may say otherwise"),
-      row<fluid, &F::viscosity>("fluid.viscosity", "Pa s", "1.8e-3", "> 0", "of the water"),
-      row<fluid, &F::compressibility>("fluid.compressibility", "1/Pa", "4.5e-10", "> 0", "of the water"),
-      row<fluid, &F::density>("fluid.density", "kg/m3", "1000", "> 0", "of the water: grains weigh less in it"),
-      row<fluid, &F::permeability_factor>("fluid.permeability_factor", "m2", "0", ">= 0", "k_c of the permeability k = k_c phi^3/(1 - phi)^2; 0: d^2/180 of the mean diameter"),
-      row<fluid, &F::porosity_min>("fluid.porosity_min", "1", "0.1", "> 0", "porosity is kept above it for permeability and storage"),
-      row<fluid, &F::porosity_max>("fluid.porosity_max", "1", "0.9", "> 0", "and below this; at most 1"),
-      row<fluid, &F::cell>("fluid.cell", "1", "2.5", "> 0", "side of a grid cell in mean grain diameters; the grid takes the nearest that fits"),
-      row<fluid, &F::cells_x>("fluid.cells_x", "", "0", "0 .. 100000", "grid cells along x; 0: from cell"),
-      row<fluid, &F::cells_y>("fluid.cells_y", "", "0", "0 .. 100000", "grid cells along y; 0: from cell"),
-      row<fluid, &F::cells_z>("fluid.cells_z", "", "0", "0 .. 100000", "grid cells along z, between floor and top wall; 0: from cell"),
-      row<fluid, &F::height>("fluid.height", "m", "0", ">= 0", "of the grid in stages without a top wall; 0: one cell above the bed as the stage begins"),
-      row<fluid, &F::closure>("fluid.closure", "", "\"full\"", "full | pressure_gradient", "force on a grain: -V/(1 - phi) grad p, or without the drag -V grad p"),
-      row<fluid, &F::exchange_interval>("fluid.exchange_interval", "", "0", ">= 0", "steps between exchanges of grains and water; 0: the longest that is stable"),
-      row<fluid, &F::solver>("fluid.solver", "", "\"automatic\"", "automatic | pcg | cholmod", "of the pressure"),
-      row<fluid, &F::tolerance>("fluid.tolerance", "1", "1e-10", "> 0", "relative residual at which the solver ends"),
-      row<fluid, &F::x_low, &W::kind>("fluid.x_low", "", "\"no_flow\"", "no_flow | pressure | flux", "side at x = 0; only where x is not periodic"),
-      row<fluid, &F::x_low, &W::pressure>("fluid.x_low_pressure", "Pa", "0", "", "excess over hydrostatic, kept at a side of kind pressure"),
-      row<fluid, &F::x_low, &W::flux>("fluid.x_low_flux", "m/s", "0", "", "Darcy velocity into the bed, at a side of kind flux"),
-      row<fluid, &F::x_high, &W::kind>("fluid.x_high", "", "\"no_flow\"", "no_flow | pressure | flux", "side at x = box.x; only where x is not periodic"),
-      row<fluid, &F::x_high, &W::pressure>("fluid.x_high_pressure", "Pa", "0", "", "excess over hydrostatic, kept at a side of kind pressure"),
-      row<fluid, &F::x_high, &W::flux>("fluid.x_high_flux", "m/s", "0", "", "Darcy velocity into the bed, at a side of kind flux"),
-      row<fluid, &F::y_low, &W::kind>("fluid.y_low", "", "\"no_flow\"", "no_flow | pressure | flux", "side at y = 0; only where y is not periodic"),
-      row<fluid, &F::y_low, &W::pressure>("fluid.y_low_pressure", "Pa", "0", "", "excess over hydrostatic, kept at a side of kind pressure"),
-      row<fluid, &F::y_low, &W::flux>("fluid.y_low_flux", "m/s", "0", "", "Darcy velocity into the bed, at a side of kind flux"),
-      row<fluid, &F::y_high, &W::kind>("fluid.y_high", "", "\"no_flow\"", "no_flow | pressure | flux", "side at y = box.y; only where y is not periodic"),
-      row<fluid, &F::y_high, &W::pressure>("fluid.y_high_pressure", "Pa", "0", "", "excess over hydrostatic, kept at a side of kind pressure"),
-      row<fluid, &F::y_high, &W::flux>("fluid.y_high_flux", "m/s", "0", "", "Darcy velocity into the bed, at a side of kind flux"),
-
       row<&S::name>("stage.name", "", required, "", "unique; letters, digits, - and _"),
       row<&S::kind>("stage.kind", "", required, "settle | consolidate | shear | shear_stress | uniaxial", "what is done to the bed"),
       row<&S::duration>("stage.duration", "s", "0", ">= 0", "of the stage; this or strain"),
@@ -211,16 +178,6 @@ std::vector<Key> make_keys() {
       row<&S::fluid_bottom>("stage.fluid_bottom", "", "\"no_flow\"", "no_flow | pressure | flux", "the floor: tight, at bottom_pressure, or with bottom_flux through it"),
       row<&S::bottom_pressure>("stage.bottom_pressure", "Pa", "0", "", "over hydrostatic, at the floor"),
       row<&S::bottom_flux>("stage.bottom_flux", "m/s", "0", "", "Darcy velocity through the floor, upwards"),
-
-      row<&S::fluid>("stage.fluid", "", "fluid.enabled", "", "pore water; the keys below count only with it, and normal_stress is then the total stress over hydrostatic"),
-      row<&S::fluid_top>("stage.fluid_top", "", "\"drained\"", "drained | impermeable", "water leaves freely at the top wall (or top of the grid), which carries top_pressure beside the grains; or not at all, and the wall carries the water's own pressure"),
-      row<&S::top_pressure>("stage.top_pressure", "Pa", "0", "", "drained: excess over hydrostatic at the top"),
-      row<&S::top_pressure_amplitude>("stage.top_pressure_amplitude", "Pa", "0", "", "of a sinusoid added to top_pressure"),
-      row<&S::top_pressure_frequency>("stage.top_pressure_frequency", "Hz", "0", ">= 0", "of that sinusoid"),
-      row<&S::top_pressure_phase>("stage.top_pressure_phase", "rad", "0", "", "of that sinusoid when the stage begins"),
-      row<bottom, &W::kind>("stage.fluid_bottom", "", "\"no_flow\"", "no_flow | pressure | flux", "water at the floor"),
-      row<bottom, &W::pressure>("stage.bottom_pressure", "Pa", "0", "", "excess over hydrostatic, kept at a bottom of kind pressure"),
-      row<bottom, &W::flux>("stage.bottom_flux", "m/s", "0", "", "Darcy velocity upwards into the bed, at a bottom of kind flux"),
 
       row<output, &O::series_interval>("output.series_interval", "s", "0.05", "> 0", "of model time"),
       row<output, &O::snapshot_interval>("output.snapshot_interval", "s", "0.5", "> 0", "of model time"),
