@@ -87,11 +87,11 @@ void times() {
         const auto before = step.report();
         double best = 1e9;
         std::int64_t count = 0;
-        for (int round = 0; round < 5; ++round) {
+        for (int round = 0; round < 25; ++round) {
           int made = 0;
           double spent = 0;
           do spent += seconds(one), ++made;
-          while (spent < 0.05);
+          while (spent < 0.01);
           best = std::min(best, spent / made), count += made;
         }
         const auto after = step.report();

@@ -156,7 +156,7 @@ int free_cholmod(SUNLinearSolver solver) {
 // hundred solves) is less than that of the iterations: bench/results/fluid-times.csv.
 double cholmod_from(std::size_t cells) {
   if (cells <= 1000) return 0.1;
-  if (cells <= 5000) return 1;
+  if (cells <= 5000) return 0.3;
   if (cells <= 20000) return 10;
   return std::numeric_limits<double>::infinity();
 }
