@@ -243,7 +243,7 @@ struct LinearSolver::Impl {
 
   void prepare(double step) {
     if (step == s && version == darcy.version()) return;
-    s = step, version = darcy.version();
+    s = step, version = 0;  // until all is made
     darcy.diagonal(s, inverse_diagonal.data());
     double number = 0;  // diagonal of s L over that of C: 6 D s/h2 in cubes
     largest_diagonal = 0;
@@ -263,11 +263,12 @@ struct LinearSolver::Impl {
         method = number / 6 > cholmod_from(n) ? Method::cholmod : Method::pcg_jacobi;
         break;
     }
-    if (method != Method::pcg_jacobi && (factor_s != s || factor_version != version)) {
+    if (method != Method::pcg_jacobi && (factor_s != s || factor_version != darcy.version())) {
       factor_version = 0;
       cholmod.factor(s);
-      factor_s = s, factor_version = version;
+      factor_s = s, factor_version = darcy.version();
     }
+    version = darcy.version();
   }
 
   [[noreturn]] void give_up(std::int64_t count, double reached, double target) const {
