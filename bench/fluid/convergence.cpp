@@ -35,7 +35,7 @@ void errors() {
     for (const int n : {10, 20, 40, 80, 160, 320, 640}) {
       Way way{0, {1e-12, 1e-9}};
       way.options.order = order, way.options.fixed_step = 2e-3 / n;
-      row("exact on the grid", "ARKODE, order " + std::to_string(order), "steps", n, time_error(way));
+      row("exact on the grid", "ARKODE order " + std::to_string(order), "steps", n, time_error(way));
     }
 }
 
@@ -72,10 +72,12 @@ struct Bed {
 
 void times() {
   std::puts("grid,work,diffusion_number,solver,us,iterations,first_ms");
-  for (const std::array<int, 3> n : {std::array{8, 8, 7}, {12, 12, 24}, {32, 32, 64}}) {
+  for (const std::array<int, 3> n : {std::array{8, 8, 7}, {12, 12, 24}, {20, 20, 40}, {32, 32, 64}}) {
     const std::string grid = std::to_string(n[0]) + "x" + std::to_string(n[1]) + "x" + std::to_string(n[2]);
     for (const double number : {1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0, 1e4})
       for (const SolverChoice choice : {SolverChoice::pcg, SolverChoice::cholmod}) {
+        // The largest factor takes seconds, whatever the number.
+        if (n[0] == 32 && choice == SolverChoice::cholmod && number != 1e-3 && number != 100) continue;
         Bed bed(n);
         PressureStep step(bed.grid, bed.sides, {choice, 1e-10, 5000});
         step.set(bed.grid, bed.medium);
@@ -85,11 +87,11 @@ void times() {
         const auto before = step.report();
         double best = 1e9;
         std::int64_t count = 0;
-        for (int round = 0; round < 5; ++round) {
+        for (int round = 0; round < 25; ++round) {
           int made = 0;
           double spent = 0;
           do spent += seconds(one), ++made;
-          while (spent < 0.05);
+          while (spent < 0.01);
           best = std::min(best, spent / made), count += made;
         }
         const auto after = step.report();
@@ -99,6 +101,7 @@ void times() {
         std::fflush(stdout);
       }
     for (const SolverChoice choice : {SolverChoice::pcg, SolverChoice::cholmod}) {
+      if (n[0] > 12) continue;
       Bed bed(n);
       EvolveOptions options{1e-5, 0.1};
       options.solver = choice;

@@ -16,8 +16,11 @@
 namespace moraine::fluid {
 namespace {
 
-// From here on a factor takes longer than the iterations that it saves.
-constexpr std::size_t cholmod_cells = 20000;
+// Beyond, solves with a factor take longer than the iterations that they save: bench/results/fluid-times.csv.
+constexpr std::size_t cholmod_cells = 1000;
+// A factor for another gamma leaves a condition of at most the ratio of both. Up to `near` it costs nothing;
+// up to `far` it is kept until iterations with it have taken the work of a new one.
+constexpr double near = 1.3, far = 6;
 
 class Integration {
  public:
@@ -119,10 +122,14 @@ class Integration {
     *current = 1;
     return self(data).guarded([&] {
       Integration& s = self(data);
-      if (s.method_ == Method::pcg_cholmod)
+      if (s.method_ == Method::pcg_cholmod) {
+        const double ratio = std::max(gamma, s.factor_gamma_) / std::min(gamma, s.factor_gamma_);
+        if (ratio < near || (ratio < far && s.solves_with_factor_ < s.cholmod_.solves_per_factor())) return;
         s.cholmod_.factor(gamma);
-      else
-        s.darcy_.diagonal(gamma, s.inverse_diagonal_.data());
+        s.factor_gamma_ = gamma, s.solves_with_factor_ = 0;
+        return;
+      }
+      s.darcy_.diagonal(gamma, s.inverse_diagonal_.data());
       for (std::size_t c = 0; c < s.n_; ++c)
         s.inverse_diagonal_[c] = s.darcy_.storage()[c] / s.inverse_diagonal_[c];
     });
@@ -136,6 +143,7 @@ class Integration {
       for (std::size_t c = 0; c < s.n_; ++c) to[c] = from[c] * s.inverse_diagonal_[c];
       return 0;
     }
+    ++s.solves_with_factor_;
     for (std::size_t c = 0; c < s.n_; ++c) to[c] = from[c] * s.root_[c];
     if (SUNLinSolSolve(s.direct_, nullptr, z, z, tolerance) != SUNLS_SUCCESS) return -1;
     for (std::size_t c = 0; c < s.n_; ++c) to[c] *= s.root_[c];
@@ -178,6 +186,8 @@ class Integration {
   void* arkode_ = nullptr;
   std::vector<double> p_, out_, rate_, root_, inverse_diagonal_;
   std::exception_ptr failure_;
+  double factor_gamma_ = 0;  // s, 0: none
+  std::int64_t solves_with_factor_ = 0;
   std::string message_ = "no message";
 };
 

@@ -12,6 +12,10 @@
 
 namespace moraine::fluid {
 
+namespace {
+constexpr std::size_t simplicial_cells = 8000;
+}
+
 struct Cholmod::Impl {
   const Darcy& darcy;
   cholmod_common common;
@@ -72,6 +76,11 @@ struct Cholmod::Impl {
       entry[a][f] = std::lower_bound(rows + columns[column], rows + columns[column + 1], row) - rows;
     });
     fill(1);
+    // Measured: up to some thousand cells the simplicial factor solves two to three times faster, AMD orders
+    // well, and both are made sooner; beyond, blocks and nested dissection win.
+    common.supernodal = n <= simplicial_cells ? CHOLMOD_SIMPLICIAL : CHOLMOD_SUPERNODAL;
+    common.nmethods = 1;
+    common.method[0].ordering = n <= simplicial_cells ? CHOLMOD_AMD : CHOLMOD_METIS;
     L = cholmod_l_analyze(A, &common);
     if (!L) throw error("pore water: CHOLMOD cannot analyse the matrix of ", n, " cells (no memory?)");
   }
@@ -97,6 +106,7 @@ struct Cholmod::Impl {
 Cholmod::Cholmod(const Darcy& darcy) : impl_(std::make_unique<Impl>(darcy)) {}
 Cholmod::~Cholmod() = default;
 std::int64_t Cholmod::factorisations() const { return impl_->factorisations; }
+double Cholmod::solves_per_factor() const { return impl_->common.fl / (4 * impl_->common.lnz); }
 std::size_t Cholmod::cells() const { return impl_->darcy.grid().cells(); }
 
 void Cholmod::factor(double s) {
@@ -140,6 +150,15 @@ int solve_cholmod(SUNLinearSolver solver, SUNMatrix, N_Vector x, N_Vector b, rea
 int free_cholmod(SUNLinearSolver solver) {
   SUNLinSolFreeEmpty(solver);
   return SUNLS_SUCCESS;
+}
+
+// Diffusion number D s/h2 from which CHOLMOD's fixed cost (a solve, and its share of a factor every few
+// hundred solves) is less than that of the iterations: bench/results/fluid-times.csv.
+double cholmod_from(std::size_t cells) {
+  if (cells <= 1000) return 0.1;
+  if (cells <= 5000) return 0.3;
+  if (cells <= 20000) return 10;
+  return std::numeric_limits<double>::infinity();
 }
 
 double norm(const double* v, std::size_t n) { return std::sqrt(dot(v, v, n)); }
@@ -224,9 +243,9 @@ struct LinearSolver::Impl {
 
   void prepare(double step) {
     if (step == s && version == darcy.version()) return;
-    s = step, version = darcy.version();
+    s = step, version = 0;  // until all is made
     darcy.diagonal(s, inverse_diagonal.data());
-    double number = 0;  // diagonal of s L over that of C: 2 D s/h2 for each axis
+    double number = 0;  // diagonal of s L over that of C: 6 D s/h2 in cubes
     largest_diagonal = 0;
     for (std::size_t i = 0; i < n; ++i) {
       largest_diagonal = std::max(largest_diagonal, inverse_diagonal[i]);
@@ -241,14 +260,15 @@ struct LinearSolver::Impl {
         method = Method::cholmod;
         break;
       case SolverChoice::automatic:
-        method = number > 30 && n <= 20000 ? Method::cholmod : Method::pcg_jacobi;
+        method = number / 6 > cholmod_from(n) ? Method::cholmod : Method::pcg_jacobi;
         break;
     }
-    if (method != Method::pcg_jacobi && (factor_s != s || factor_version != version)) {
+    if (method != Method::pcg_jacobi && (factor_s != s || factor_version != darcy.version())) {
       factor_version = 0;
       cholmod.factor(s);
-      factor_s = s, factor_version = version;
+      factor_s = s, factor_version = darcy.version();
     }
+    version = darcy.version();
   }
 
   [[noreturn]] void give_up(std::int64_t count, double reached, double target) const {

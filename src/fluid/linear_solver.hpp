@@ -21,6 +21,7 @@ class Cholmod {
   void factor(double s);  // throws Error where the matrix is not positive definite in double precision
   void solve(const double* b, double* x);
   std::int64_t factorisations() const;
+  double solves_per_factor() const;  // how many solves take the arithmetic of one factor
   std::size_t cells() const;
 
  private:

@@ -103,6 +103,25 @@ TEST(Evolve, AgreesWithCvode) {
   }
 }
 
+// A kept factor is as good as its gamma is near: a handful of iterations where the diagonal needs some tens.
+TEST(Evolve, KeptFactorsSaveIterations) {
+  Grid grid{{6, 6, 12}, {0.15, 0.15, 0.3}, {true, true, false}};
+  Sides sides;
+  sides.high[2] = pressure_side(0);
+  const Medium m = uniform(grid, 0.4, 1e-12);
+  const double storage = m.compressibility * 0.4 * grid.cell_volume(), end = 0.09 / diffusivity(m);
+  Evolved done[2];
+  for (const bool factor : {false, true}) {
+    EvolveOptions options{1e-5, 0.1};
+    options.solver = factor ? SolverChoice::cholmod : SolverChoice::pcg;
+    std::vector<double> q(grid.cells(), 1e4 * storage), p;
+    done[factor] = evolve(grid, sides, m, 0, end, q, p, options);
+  }
+  EXPECT_LT(done[1].iterations, 5 * done[1].solves);
+  EXPECT_LT(2 * done[1].iterations, done[0].iterations);
+  EXPECT_LT(done[1].factorisations, done[1].steps);
+}
+
 // Two implementations of the same grid: many short steps of backward Euler (first order: 1e-3) and evolve.
 TEST(Evolve, AgreesWithManySmallSteps) {
   const Setting s(3);
