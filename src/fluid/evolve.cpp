@@ -22,6 +22,13 @@ constexpr std::size_t cholmod_cells = 1000;
 // up to `far` it is kept until iterations with it have taken the work of a new one.
 constexpr double near = 1.3, far = 6;
 
+// ARKODE takes a first linear solve that only lowered the residual for done, and a linear problem has no
+// second: with the iterations used up, steps of fixed length could end anywhere.
+int solve_or_fail(SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, double tolerance) {
+  const int flag = SUNLinSolSolve_PCG(solver, matrix, x, b, tolerance);
+  return flag == SUNLS_RES_REDUCED ? SUNLS_CONV_FAIL : flag;
+}
+
 class Integration {
  public:
   Integration(const Darcy& darcy, const EvolveOptions& options, const Source& source)
@@ -37,6 +44,7 @@ class Integration {
     direct_ = make_cholmod_solver(cholmod_, context_);
     pcg_ = SUNLinSol_PCG(y_, SUN_PREC_LEFT, options.max_iterations, context_);
     if (!pcg_) throw error("pore water: no memory for the linear solver of ", n_, " cells");
+    pcg_->ops->solve = solve_or_fail;
   }
   ~Integration() {
     ARKStepFree(&arkode_);

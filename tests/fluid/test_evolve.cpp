@@ -199,6 +199,9 @@ TEST(Evolve, GivesUpWithAMessageAndLeavesTheState) {
   EvolveOptions weak;
   weak.max_iterations = 1, weak.fixed_step = 0.1, weak.solver = SolverChoice::pcg;
   refused(weak, s.source, {"gave up at t = ", "pcg, jacobi", "solver convergence"});
+  // A residual that was lowered, but not to the tolerance, is no solution either.
+  weak.max_iterations = 3, weak.fixed_step = 0.02;
+  refused(weak, s.source, {"gave up at t = ", "pcg, jacobi", "solver convergence"});
   refused({}, [](double, std::vector<double>&) { throw error("the source ran dry"); },
           {"the source ran dry"});
   EvolveOptions wrong;
