@@ -78,6 +78,16 @@ void check_case(const Entries& entries) {
   c.expect(c.number("fluid.porosity_min") < c.number("fluid.porosity_max"), "fluid.porosity_min",
            "less than fluid.porosity_max = ", c.number("fluid.porosity_max"));
   c.expect(c.number("fluid.porosity_max") < 1, "fluid.porosity_max", "less than 1");
+  const string periodic = c.text("box.periodic");
+  for (const string side : {"x_low", "x_high", "y_low", "y_high"}) {
+    const string key = "fluid." + side, kind = c.text(key);
+    c.expect(kind == "no_flow" || periodic == "none" || periodic.find(side[0]) == string::npos, key,
+             "no_flow: ", side[0], " is periodic (box.periodic = \"", periodic, "\")");
+    c.expect(kind == "pressure" || c.number(key + "_pressure") == 0, key + "_pressure", "0 Pa, or ", side,
+             " = \"pressure\"");
+    c.expect(kind == "flux" || c.number(key + "_flux") == 0, key + "_flux", "0 m/s, or ", side,
+             " = \"flux\"");
+  }
   if (c.text("box.periodic").find('z') != string::npos) {
     c.expect(c.number("box.z") > 0, "box.z", "> 0 m where z is periodic");
     c.expect(!c.flag("box.floor"), "box.floor", "false where z is periodic");
@@ -89,6 +99,8 @@ void check_water(const Reader& s, const Reader& above, bool no_wall) {
   const string bottom = s.text("stage.fluid_bottom");
   for (const char* key : {"stage.top_pressure", "stage.top_pressure_amplitude"})
     s.expect(!tight || s.number(key) == 0, key, "0 Pa: the top is impermeable");
+  for (const char* key : {"stage.top_pressure_frequency", "stage.top_pressure_phase"})
+    s.expect(!tight || s.number(key) == 0, key, "0: the top is impermeable");
   s.expect(s.number("stage.top_pressure_amplitude") == 0 || s.number("stage.top_pressure_frequency") > 0,
            "stage.top_pressure_frequency", "> 0 Hz with an amplitude");
   s.expect(bottom == "pressure" || s.number("stage.bottom_pressure") == 0, "stage.bottom_pressure",

@@ -24,6 +24,15 @@ struct Grains {
   bool operator==(const Grains&) const = default;
 };
 
+// What water does at a side of the box.
+struct FluidSide {
+  enum class Kind { no_flow, pressure, flux };
+  Kind kind;
+  double pressure;  // Pa
+  double flux;      // m/s, into the bed
+  bool operator==(const FluidSide&) const = default;
+};
+
 // Pore water (src/coupling).
 struct Fluid {
   enum class Closure { full, pressure_gradient };
@@ -41,6 +50,7 @@ struct Fluid {
   std::int64_t exchange_interval;  // steps; 0: the longest that is stable
   Solver solver;
   double tolerance;
+  FluidSide x_low, x_high, y_low, y_high;  // where not periodic
   bool operator==(const Fluid&) const = default;
 };
 

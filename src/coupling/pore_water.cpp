@@ -60,7 +60,7 @@ class GridWater final : public PoreWater {
       begin(before);
       t_ = scene.time(s.step);
     }
-    choose_interval(s);
+    choose_interval(s, restart);
   }
 
   bool stale() const override { return stale_; }
@@ -413,7 +413,8 @@ class GridWater final : public PoreWater {
     return lambda + std::abs(lambda - last);
   }
 
-  void choose_interval(const dem::State& s) {
+  // A restart keeps the interval that the stage began with, whatever its present contacts would allow.
+  void choose_interval(const dem::State& s, bool restart) {
     stability_.w_sk = std::sqrt(dem::spectrum(scene_, s).stiffness);
     // A bed that has not met yet will.
     stability_.w_sk = std::max(stability_.w_sk, 2 / dem::one_contact_step(scene_, s));
@@ -421,6 +422,10 @@ class GridWater final : public PoreWater {
     const double w = std::hypot(stability_.w_sk, stability_.w_f);
     stability_.longest_dt = most_of_limit * 2 / w;
     stability_.longest = static_cast<std::int64_t>(stability_.longest_dt / scene_.dt);
+    if (restart && water_.interval > 0) {
+      interval_ = water_.interval;
+      return;
+    }
     if (stability_.longest < 1)
       throw error("pore water: grains on the water's stiffness swing at ", stability_.w_f,
                   " rad/s, the contacts at ", stability_.w_sk, " rad/s, so a step of ", scene_.dt,

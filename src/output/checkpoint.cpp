@@ -332,6 +332,20 @@ void validate(const std::string& file, const dem::State& state) {
     fail("wall_contacts are not sorted by (wall, i)");
 }
 
+void validate(const std::string& file, const Checkpoint& c) {
+  validate(file, c.state);
+  const coupling::WaterState& w = c.water;
+  const std::size_t n = c.state.r.size();
+  const auto fail = [&](const auto&... parts) { throw error(file, ": /water: ", parts...); };
+  if (w.p.size() != w.q.size()) fail("p has ", w.p.size(), " rows, q has ", w.q.size());
+  if (!w.x_map.empty() && w.x_map.size() != n) fail("x_map has ", w.x_map.size(), " rows for ", n, " grains");
+  if (c.scene.exchange_interval <= 0) return;
+  if (w.q.empty())
+    fail("q is empty, though grains and water meet every ", c.scene.exchange_interval, " steps");
+  if (w.x_map.empty() && n > 0) fail("x_map is empty");
+  if (c.state.water_force.size() != n) fail("/state/water_force has no rows");
+}
+
 }  // namespace
 
 void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint) {
@@ -361,7 +375,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
   }
   Checkpoint checkpoint;
   for_each_member<Checkpoint>([&](const char* name, auto pointer) { get(file, name, checkpoint.*pointer); });
-  validate(file.where(), checkpoint.state);
+  validate(file.where(), checkpoint);
   return checkpoint;
 }
 

@@ -214,6 +214,8 @@ void write_water_grid(std::ostream& text, const SnapshotInfo& s) {
 
 // Steps of a wet case: the grid alone, or (bed.xdmf) grains and grid side by side.
 std::string wet_xdmf(const std::vector<SnapshotInfo>& snapshots, bool with_grains) {
+  Cloud wet_grains = clouds[0];
+  wet_grains.fields.push_back({"water_force", real, 3});
   std::ostringstream text;
   text << "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Xdmf Version=\"3.0\">\n<Domain>\n"
        << "<Grid Name=\"steps\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
@@ -222,7 +224,7 @@ std::string wet_xdmf(const std::vector<SnapshotInfo>& snapshots, bool with_grain
     if (with_grains)
       text << "<Grid Name=\"bed\" GridType=\"Collection\" CollectionType=\"Spatial\"><Time Value=\""
            << shortest(s.time) << "\"/>\n";
-    if (with_grains) write_grid(text, clouds[0], s);
+    if (with_grains) write_grid(text, wet_grains, s);
     write_water_grid(text, s);
     if (with_grains) text << "</Grid>\n";
   }

@@ -18,7 +18,7 @@ void bench_case(const Options& options, const std::string& stage_name, std::int6
   const Start start = start_of(c);
   dem::State state = start.state;
   Stage stage = prepare(c, index, start, state);
-  const auto water = fill(stage, state, {}, false);
+  const auto water = fill(stage, state, start.water, false);
   const auto engine = dem::make_engine(options.backend, options.threads);
   engine->load(stage.scene, state, water.get());
   steps = at_exchange(stage, steps);

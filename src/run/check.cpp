@@ -112,7 +112,7 @@ void check_case(const Options& options) {
     if (k == 0) {
       dem::Scene timed = scene;  // with a step that the bed survives: how long one takes is the same
       timed.dt = std::min(scene.dt, 0.5 * critical_step(scene, s));
-      auto timed_water = fill(stage, s, {}, false);
+      auto timed_water = fill(stage, s, start.water, false);
       timed.exchange_interval = stage.scene.exchange_interval;
       ms = time_a_step(*engine, timed, s, timed_water.get());
       std::printf("  backend       %s\n", engine->describe().c_str());
@@ -147,7 +147,7 @@ void check_case(const Options& options) {
                     inertia > 1e-3 ? "  (above 1e-3: not pseudo-static)" : "");
       }
     }
-    if (const auto water = fill(stage, s, {}, false))
+    if (const auto water = fill(stage, s, start.water, false))
       print_water(c, stage, s, *water, wanted.kind == cases::Stage::Kind::settle ? settled : stage.height_0,
                   strain_rate);
     std::printf("    time        about %s at %.3g ms a step\n", readable_time(steps * ms / 1e3).c_str(), ms);

@@ -124,8 +124,9 @@ std::vector<std::string> precheck(const cases::Case& c, const Start& start, dem:
     check_step(stage, s, warnings);
     check_margin(stage, s, warnings);
     check_cells(stage, warnings);
-    std::unique_ptr<coupling::PoreWater> water;  // refuses what is impossible
-    if (k == 0 || !c.start.empty()) water = fill(stage, s, {}, false);
+    // Refuses what is impossible; a later stage of loose grains is judged when it comes, with its bed.
+    std::unique_ptr<coupling::PoreWater> water;
+    if (k == 0 || !c.start.empty() || !coupling::water_built()) water = fill(stage, s, start.water, false);
     if (k > 0) continue;
     engine.load(stage.scene, s, water.get());
     check_overlaps(c, stage.scene, engine.state());

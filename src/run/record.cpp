@@ -64,7 +64,8 @@ void add_water(output::Row& row, const Stage& stage, const coupling::PoreWater& 
   const coupling::WaterRecord r = water.record(/*upper_half=*/shears(stage.kind));
   const coupling::WaterState s = water.state();
   row.wall_water_pressure = s.wall_pressure;
-  row.total_friction = row.shear_stress / (row.normal_stress + s.wall_pressure);
+  const double total = row.normal_stress + s.wall_pressure;
+  row.total_friction = total > 0 ? row.shear_stress / total : 0;
   row.water_pressure_mean = r.mean, row.water_pressure_min = r.least, row.water_pressure_max = r.most;
   row.water_drained_top = s.drained_top, row.water_drained_bottom = s.drained_bottom;
   row.water_volume = r.volume, row.water_balance = r.balance;

@@ -43,6 +43,15 @@ void make_directories(const fs::path& path) {
   if (failed) throw error(path.string(), ": cannot be created: ", failed.message());
 }
 
+std::string stability_of(const coupling::PoreWater& water, double dt) {
+  const coupling::Stability s = water.stability();
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "stable up to %.3g s, %.3g of it taken (contacts %.3g rad/s, water %.3g rad/s)", s.longest_dt,
+                static_cast<double>(water.interval()) * dt / s.longest_dt, s.w_sk, s.w_f);
+  return text;
+}
+
 class Runner {
  public:
   Runner(const Options& options, const cases::Case& c)
@@ -94,7 +103,7 @@ class Runner {
   void run_stages(bool resuming) {
     if (!resuming) {
       now_.case_text = case_.resolved;
-      now_.state = start_.state;
+      now_.state = start_.state, now_.water = start_.water;
     }
     now_.version = MORAINE_VERSION;
     const std::string header = "# moraine " MORAINE_VERSION ", " + engine_->describe() + ", seed " +
@@ -140,19 +149,18 @@ class Runner {
     }
     char text[200];
     std::int64_t step = now_.state.step;
-    const auto steps = step + std::llround((stage.duration - stage.scene.time(step)) / stage.scene.dt);
+    const std::int64_t steps = last_step(stage);
     std::snprintf(text, sizeof text, "stage %s: %lld steps of %.3g s%s", stage.name.c_str(),
                   static_cast<long long>(steps), stage.scene.dt,
                   case_.automatic_dt ? ", which follows the bed" : "");
     progress_->say(text);
-    if (water_) progress_->say(water_->describe());
+    if (water_) progress_->say(water_->describe() + "; " + stability_of(*water_, stage.scene.dt));
     progress_->begin(stage.name, step, steps, 0);
 
     Guard guard(case_.guards, stage, now_.rows);
-    std::int64_t slice = 64;  // steps between looks at the clock
-    for (bool ended = stage.scene.time(step) > stage.duration - 0.5 * stage.scene.dt; !ended;) {
-      Event event = next_event(stage, step);
-      event.step = at_exchange(stage, event.step);
+    std::int64_t slice = at_exchange(stage, 64);  // steps between looks at the clock
+    for (bool ended = step >= last_step(stage); !ended;) {
+      const Event event = next_event(stage, step);
       const std::int64_t look = at_exchange(stage, (step / guard.every() + 1) * guard.every());
       std::int64_t until = std::min({event.step, look, step + slice});
       const std::int64_t estimate = now_.critical_at + steps_between_estimates;
@@ -203,6 +211,7 @@ class Runner {
     now_.rows.push_back(row_of(static_cast<std::size_t>(now_.stage), stage, now_.state, now_.stage_start_time,
                                now_.energy_0));
     if (water_) add_water(now_.rows.back(), stage, *water_);
+    if (!water_ && case_.has_water()) now_.rows.back().total_friction = now_.rows.back().shear_friction;
     series_->append(now_.rows.back());
   }
 
@@ -219,7 +228,7 @@ class Runner {
 
   void take_state() {
     now_.state = engine_->state();
-    if (water_) now_.water = water_->state();
+    now_.water = water_ ? water_->state() : coupling::WaterState{};
   }
 
   void save() {

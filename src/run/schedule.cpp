@@ -10,8 +10,13 @@ namespace moraine::run {
 
 namespace {
 
+std::int64_t between_exchanges(const dem::Scene& scene) {
+  return std::max<std::int64_t>(1, scene.exchange_interval);
+}
+
 std::int64_t step_at(const dem::Scene& scene, double time) {
-  return scene.step_0 + std::llround((time - scene.time_0) / scene.dt);
+  const std::int64_t m = between_exchanges(scene);
+  return scene.step_0 + m * std::llround((time - scene.time_0) / (static_cast<double>(m) * scene.dt));
 }
 
 // The next multiple of the interval that a later step is nearest to.
@@ -30,12 +35,14 @@ Event next_event(const Stage& stage, std::int64_t step) {
   const double time = std::min({series, snapshot, stage.duration});
   const std::int64_t at = step_at(scene, time);
   const bool end = at >= step_at(scene, stage.duration);
-  return {end ? stage.duration : time, std::max(at, step + 1), end || at == step_at(scene, series),
-          end || at == step_at(scene, snapshot), end};
+  return {end ? stage.duration : time, std::max(at, step + between_exchanges(scene)),
+          end || at == step_at(scene, series), end || at == step_at(scene, snapshot), end};
 }
 
+std::int64_t last_step(const Stage& stage) { return step_at(stage.scene, stage.duration); }
+
 std::int64_t at_exchange(const Stage& stage, std::int64_t step) {
-  const std::int64_t m = std::max<std::int64_t>(1, stage.scene.exchange_interval);
+  const std::int64_t m = between_exchanges(stage.scene);
   return (step + m - 1) / m * m;
 }
 

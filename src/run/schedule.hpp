@@ -14,10 +14,12 @@ constexpr std::int64_t steps_between_estimates = 1000;
 
 struct Event {
   double time;        // s of the stage
-  std::int64_t step;  // nearest to it, with the present dt
+  std::int64_t step;  // nearest to it, with the present dt; an exchange where there is pore water
   bool series, snapshot, end;
 };
 Event next_event(const Stage& stage, std::int64_t step);
+
+std::int64_t last_step(const Stage& stage);  // of the stage, with the present dt
 
 // The same or the first later step at which grains meet pore water: only there is the state whole.
 std::int64_t at_exchange(const Stage& stage, std::int64_t step);

@@ -88,8 +88,8 @@ Start start_of(const cases::Case& c) {
     dem::synchronise(before.scene, before.state);
     if (!before.finished)
       throw error(c.start.string(), ": the case it belongs to has not finished; run it to its end first");
-    Start s{std::move(before.state), before.scene.box.x, before.scene.box.y, before.scene.box.z,
-            before.scene.top_wall.mass};
+    Start s{std::move(before.state), before.scene.box.x,         before.scene.box.y,
+            before.scene.box.z,      before.scene.top_wall.mass, std::move(before.water)};
     if (c.box_x > 0) s.box_x = c.box_x;
     if (c.box_y > 0) s.box_y = c.box_y;
     if (c.box_z > 0) s.box_z = c.box_z;
@@ -108,10 +108,17 @@ Start start_of(const cases::Case& c) {
   p.box_x = c.box_x, p.box_y = c.box_y;
   dem::Lattice lattice = dem::make_lattice(p);
   const double wall_mass = default_wall_mass(c, lattice.state.size(), lattice.cell);
-  return {std::move(lattice.state), lattice.box_x, lattice.box_y, c.box_z, wall_mass};
+  return {std::move(lattice.state), lattice.box_x, lattice.box_y, c.box_z, wall_mass, {}};
 }
 
 namespace {
+
+fluid::Side side_of(const cases::FluidSide& side) {
+  using Kind = cases::FluidSide::Kind;
+  if (side.kind == Kind::pressure) return {fluid::Side::Kind::pressure, side.pressure};
+  if (side.kind == Kind::flux) return {fluid::Side::Kind::flux, side.flux};
+  return {};
+}
 
 coupling::Water water_of(const cases::Case& c, const cases::Stage& stage, const dem::Scene& scene,
                          double height, double diameter) {
@@ -137,8 +144,11 @@ coupling::Water water_of(const cases::Case& c, const cases::Stage& stage, const 
   if (stage.fluid_bottom == cases::Stage::FluidBottom::pressure)
     w.sides.low[2] = {Kind::pressure, stage.bottom_pressure};
   if (stage.fluid_bottom == cases::Stage::FluidBottom::flux) w.sides.low[2] = {Kind::flux, stage.bottom_flux};
+  w.sides.low[0] = side_of(f.x_low), w.sides.high[0] = side_of(f.x_high);
+  w.sides.low[1] = side_of(f.y_low), w.sides.high[1] = side_of(f.y_high);
   w.closure = coupling::Closure(int(f.closure));
-  w.interval = f.exchange_interval;
+  // After a restart the interval of the stage: from other contacts another one would be chosen.
+  w.interval = scene.exchange_interval > 0 ? scene.exchange_interval : f.exchange_interval;
   w.solver = coupling::Solver(int(f.solver)), w.tolerance = f.tolerance;
   return w;
 }

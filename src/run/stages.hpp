@@ -14,6 +14,7 @@ struct Start {
   dem::State state;            // velocities at the step, not staggered
   double box_x, box_y, box_z;  // m
   double wall_mass;            // kg
+  coupling::WaterState water;  // that the case before has left; empty where it was dry
 };
 // Draws the grains, or reads them from case.start.
 Start start_of(const cases::Case& c);

@@ -256,6 +256,90 @@ TEST_F(CaseTest, every_key_is_in_the_reference) {
   }
 }
 
+TEST_F(CaseTest, a_case_is_dry_unless_it_says_otherwise) {
+  write(settle + shear);
+  EXPECT_FALSE(load().has_water());
+  EXPECT_FALSE(load().stages[1].fluid);
+  EXPECT_EQ(load().fluid.viscosity, 1.8e-3);
+  EXPECT_EQ(load().fluid.compressibility, 4.5e-10);
+  EXPECT_EQ(load().fluid.density, 1000);
+  EXPECT_EQ(load().fluid.cell, 2.5);
+  EXPECT_EQ(load().fluid.exchange_interval, 0);
+  EXPECT_EQ(load().fluid.tolerance, 1e-10);
+  EXPECT_TRUE(load({{"stage.shear.fluid", "true"}}).has_water());
+  EXPECT_FALSE(load({{"stage.shear.fluid", "true"}}).stages[0].fluid);
+  const Case wet = load({{"fluid.enabled", "true"}, {"stage.settle.fluid", "false"}});
+  EXPECT_FALSE(wet.stages[0].fluid);
+  EXPECT_TRUE(wet.stages[1].fluid);
+}
+
+TEST_F(CaseTest, water_in_any_unit) {
+  write(
+      "[box]\nperiodic = \"x\"\n[fluid]\nenabled = true\nviscosity = \"1.8 mPa s\"\ncompressibility = "
+      "\"0.45 1/GPa\"\npermeability_factor = \"35 mm2\"\nclosure = \"pressure_gradient\"\nsolver = "
+      "\"cholmod\"\ny_low = \"pressure\"\ny_low_pressure = \"2 kPa\"\ny_high = \"flux\"\ny_high_flux = "
+      "\"1 mm/s\"\n" +
+      shear +
+      "top_pressure = \"3 kPa\"\ntop_pressure_amplitude = \"1 kPa\"\ntop_pressure_frequency = \"0.2 "
+      "Hz\"\nfluid_bottom = \"flux\"\nbottom_flux = \"1 mm/s\"\n");
+  const Case c = load();
+  EXPECT_DOUBLE_EQ(c.fluid.viscosity, 1.8e-3);
+  EXPECT_DOUBLE_EQ(c.fluid.compressibility, 4.5e-10);
+  EXPECT_DOUBLE_EQ(c.fluid.permeability_factor, 3.5e-5);
+  EXPECT_EQ(c.fluid.closure, Fluid::Closure::pressure_gradient);
+  EXPECT_EQ(c.fluid.solver, Fluid::Solver::cholmod);
+  EXPECT_EQ(c.fluid.y_low.kind, FluidSide::Kind::pressure);
+  EXPECT_EQ(c.fluid.y_low.pressure, 2e3);
+  EXPECT_EQ(c.fluid.y_high.kind, FluidSide::Kind::flux);
+  EXPECT_DOUBLE_EQ(c.fluid.y_high.flux, 1e-3);
+  EXPECT_EQ(c.stages[0].top_pressure, 3e3);
+  EXPECT_EQ(c.stages[0].fluid_bottom, Stage::FluidBottom::flux);
+  EXPECT_DOUBLE_EQ(c.stages[0].bottom_flux, 1e-3);
+  write(c.resolved);
+  const Case again = load();
+  EXPECT_EQ(again.fluid, c.fluid);
+  EXPECT_EQ(again.stages, c.stages);
+}
+
+TEST_F(CaseTest, water_that_contradicts_itself) {
+  write(settle + shear);
+  // With these settings the error names the key, and what was expected.
+  const auto expect_fault = [&](const std::vector<Override>& settings, const std::string& key,
+                                const std::string& expected) {
+    const std::string found = fault(settings);
+    EXPECT_NE(found.find(key), found.npos) << found;
+    EXPECT_NE(found.find("expected " + expected), found.npos) << found;
+  };
+  const Override wet{"fluid.enabled", "true"};
+  expect_fault({wet, {"model.dt", "auto"}}, "fluid", "false with model.dt = \"auto\"");
+  expect_fault({wet,
+                {"box.periodic", "xyz"},
+                {"box.z", "1"},
+                {"box.floor", "false"},
+                {"stage.shear.top_wall", "none"},
+                {"stage.shear.normal_stress", "0"}},
+               "fluid", "false where z is periodic");
+  expect_fault({wet, {"stage.settle.fluid_top", "impermeable"}}, "stage.settle.fluid_top",
+               "drained: there is no");
+  const Override tight{"stage.shear.fluid_top", "impermeable"};
+  for (const char* key : {"top_pressure", "top_pressure_amplitude", "top_pressure_frequency"})
+    expect_fault({wet, tight, {"stage.shear." + std::string(key), "1"}}, "stage.shear." + std::string(key),
+                 "0");
+  expect_fault({wet, {"stage.shear.top_pressure_amplitude", "1"}}, "top_pressure_frequency", "> 0 Hz");
+  expect_fault({wet, {"stage.shear.bottom_flux", "1"}}, "bottom_flux", "0 m/s, or fluid_bottom");
+  expect_fault({wet, {"stage.shear.bottom_pressure", "1"}}, "bottom_pressure", "0 Pa, or fluid_bottom");
+  expect_fault({{"stage.shear.top_pressure", "1"}}, "top_pressure", "0 Pa: there is no pore water");
+  expect_fault({{"fluid.x_low", "pressure"}}, "fluid.x_low", "no_flow: x is periodic");
+  expect_fault({{"box.periodic", "y"}, {"fluid.x_low_flux", "1"}}, "fluid.x_low_flux", "0 m/s, or x_low");
+  expect_fault({{"box.periodic", "y"}, {"fluid.x_low", "flux"}, {"fluid.x_low_pressure", "1"}},
+               "fluid.x_low_pressure", "0 Pa, or x_low");
+  expect_fault({{"fluid.porosity_min", "0.9"}}, "fluid.porosity_min", "less than fluid.porosity_max = 0.9");
+  expect_fault({{"fluid.porosity_max", "1"}}, "fluid.porosity_max", "less than 1");
+  for (const char* key : {"viscosity", "compressibility", "density", "porosity_min", "cell", "tolerance"})
+    expect_fault({{"fluid." + std::string(key), "0"}}, "fluid." + std::string(key), "> 0");
+  expect_fault({{"fluid.cells_x", "-1"}}, "fluid.cells_x", ">= 0");
+}
+
 TEST_F(CaseTest, unknown_keys_name_the_nearest) {
   EXPECT_EQ(fault_of("[contact]\nmu_ss = 0.3\n" + settle),
             "x/case.toml:2: contact.mu_ss = 0.3: unknown key; did you mean contact.mu_s?");
@@ -265,9 +349,9 @@ TEST_F(CaseTest, unknown_keys_name_the_nearest) {
             "x/case.toml:2: contact.gravity = 9: unknown key; did you mean model.gravity?");
   EXPECT_EQ(fault_of("[contcat]\nmu_s = 9\n" + settle),
             "x/case.toml:1: [contcat]: unknown table; did you mean [contact]?");
-  EXPECT_EQ(fault_of("[fluid]\nmu = 9\n" + settle),
-            "x/case.toml:1: [fluid]: unknown table; known: box, grains, contact, wall, model, stage, output, "
-            "guards");
+  EXPECT_EQ(fault_of("[ice]\nmu = 9\n" + settle),
+            "x/case.toml:1: [ice]: unknown table; known: box, grains, contact, wall, model, fluid, stage, "
+            "output, guards");
   EXPECT_EQ(fault_of("[wall]\nroughness = 9\n" + settle),
             "x/case.toml:2: wall.roughness = 9: unknown key; known here: k_t, mass, gamma_n, gamma_t");
   EXPECT_EQ(

@@ -30,6 +30,13 @@ Checkpoint sample(dem::Index grains) {
   c.scene.top_wall.drive = dem::TopWall::Drive::velocity;
   c.scene.shear = {dem::Shear::Drive::stress, number(), number(), true};
   c.state = random_state(number, grains);
+  c.scene.exchange_interval = grains > 0 ? 4 : 0;
+  for (dem::Index k = 0; k < grains; ++k) {
+    c.state.water_force.push_back(number.vector());
+    c.water.q.push_back(number()), c.water.p.push_back(number()), c.water.x_map.push_back(number.vector());
+  }
+  c.water.exchanges = 7;
+  c.water.volume_0 = number();
   for (dem::Index k = 0; k < grains; ++k) {
     c.rows.push_back(number.row());
     c.snapshots.push_back({"02-shear-" + std::to_string(k) + ".h5", number(), grains, k});
@@ -67,6 +74,9 @@ TEST_F(CheckpointFile, KeepsEveryBit) {
     EXPECT_EQ(read.state.x, written.state.x);
     EXPECT_EQ(read.state.role, written.state.role);
     EXPECT_EQ(read.state.step, written.state.step);
+    EXPECT_EQ(read.state.water_force, written.state.water_force);
+    EXPECT_EQ(read.water.q, written.water.q);
+    EXPECT_EQ(read.water.x_map, written.water.x_map);
     EXPECT_TRUE(std::signbit(read.height_0));
     EXPECT_EQ(read.energy_0, written.energy_0);
     ASSERT_EQ(read.rows.size(), written.rows.size());
@@ -149,6 +159,25 @@ TEST_F(CheckpointFile, RefusesWhatIsNoState) {
   H5Ldelete(file, "state/torque", H5P_DEFAULT);
   H5Fclose(file);
   EXPECT_TRUE(refused("/torque: cannot open the dataset")) << why_not();
+}
+
+TEST_F(CheckpointFile, RefusesWhatIsNoWater) {
+  const auto expect_refused = [&](auto spoil, const char* part) {
+    Checkpoint c = sample(3);
+    spoil(c);
+    write_checkpoint(path, c);
+    EXPECT_TRUE(contains(why_not(), path.string() + ": /water: ") && contains(why_not(), part)) << why_not();
+  };
+  expect_refused([](Checkpoint& c) { c.water.p.pop_back(); }, "p has 2 rows, q has 3");
+  expect_refused([](Checkpoint& c) { c.water.x_map.pop_back(); }, "x_map has 2 rows for 3 grains");
+  expect_refused([](Checkpoint& c) { c.water.x_map.clear(); }, "x_map is empty");
+  expect_refused([](Checkpoint& c) { c.water = {}; }, "meet every 4 steps");
+  expect_refused([](Checkpoint& c) { c.state.water_force.clear(); }, "water_force has no rows");
+
+  Checkpoint dry = sample(3);
+  dry.scene.exchange_interval = 0, dry.water = {}, dry.state.water_force.clear();
+  write_checkpoint(path, dry);
+  EXPECT_EQ(why_not(), "");
 }
 
 TEST_F(CheckpointFile, OutlivesAKilledWriter) {

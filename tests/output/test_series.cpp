@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "output/hdf5.hpp"
 #include "samples.hpp"
 #include "temporary_directory.hpp"
 
@@ -55,7 +56,7 @@ TEST_F(SeriesFile, KeepsEveryBit) {
   for (const int given : {0, 1, 700}) {
     std::vector<Row> rows = some_rows(given);
     {
-      Series series(path, rows);
+      Series series(path, rows, /*with_water=*/true);
       expect_rows(rows);
       for (int k = 0; k < 300; ++k) {
         rows.push_back(number.row());
@@ -67,6 +68,21 @@ TEST_F(SeriesFile, KeepsEveryBit) {
     expect_rows(rows);
     EXPECT_TRUE(opens_plainly());
   }
+}
+
+// As files without pore water have always been.
+TEST_F(SeriesFile, HasNoColumnsOfWaterWithoutWater) {
+  const std::vector<Row> rows = some_rows(3);
+  { Series series(path, {rows[0]}); }
+  const auto has = [&](std::size_t column) {
+    return hdf5::File::open(path, H5F_ACC_RDONLY).holds(columns()[column].name);
+  };
+  for (std::size_t c = 0; c < columns().size(); ++c) EXPECT_EQ(has(c), c < dry_columns) << columns()[c].name;
+  const std::vector<Row> read = read_series(path);
+  ASSERT_EQ(read.size(), 1u);
+  EXPECT_EQ(read[0].residue, rows[0].residue);
+  EXPECT_EQ(read[0].water_balance, 0);
+  EXPECT_EQ(std::string(columns()[dry_columns].name), "wall_water_pressure");
 }
 
 TEST_F(SeriesFile, CanBeReadWhileItGrows) {
@@ -86,7 +102,7 @@ TEST_F(SeriesFile, CanBeReadWhileItGrows) {
     std::fputs(complaint.c_str(), stderr);
     _exit(complaint.empty() ? 0 : 1);
   }
-  Series series(path, {});
+  Series series(path, {}, true);
   for (const Row& row : rows) {
     series.append(row);
     usleep(200);
@@ -100,7 +116,7 @@ TEST_F(SeriesFile, IsReadAndReplacedAfterAKill) {
   const std::vector<Row> rows = some_rows(5);
   const pid_t writer = fork();
   if (writer == 0) {
-    Series series(path, {});
+    Series series(path, {}, true);
     for (const Row& row : rows) series.append(row);
     raise(SIGKILL);
   }
@@ -108,7 +124,7 @@ TEST_F(SeriesFile, IsReadAndReplacedAfterAKill) {
   expect_rows(rows);
 
   {
-    Series series(path, {rows[0], rows[1]});
+    Series series(path, {rows[0], rows[1]}, true);
     series.append(rows[2]);
   }
   expect_rows({rows[0], rows[1], rows[2]});

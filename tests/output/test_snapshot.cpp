@@ -119,6 +119,62 @@ TEST_F(Snapshot, HasTheSameBytesEachTime) {
   EXPECT_EQ(contents(path(info)), before);
 }
 
+// 2 x 1 x 3 cells; the grid grows with `height`.
+coupling::WaterFields water_of(double height) {
+  coupling::WaterFields w;
+  w.grid.n = {2, 1, 3};
+  w.grid.length = {3, 3, height};
+  for (int c = 0; c < 6; ++c) {
+    w.pressure.push_back(100 * c), w.porosity.push_back(0.4), w.permeability.push_back(1e-9);
+    w.flux.push_back({1e-3 * c, 0, 0});
+  }
+  return w;
+}
+
+TEST_F(Snapshot, HasTheWatersGrid) {
+  Bed bed;
+  bed.state.water_force = {{3, 0, 0}, {1, 0, 0}, {2, 0, 0}};
+  const SnapshotInfo info = write_snapshot(directory.path(), "a", 0, bed.scene, bed.state, water_of(1.5));
+  EXPECT_EQ(read<Vec3d>(path(info), "grains", "water_force"),
+            (std::vector<Vec3d>{{1, 0, 0}, {2, 0, 0}, {3, 0, 0}}));  // by id
+  EXPECT_EQ(read<double>(path(info), "water", "pressure"), (std::vector<double>{0, 100, 200, 300, 400, 500}));
+  EXPECT_EQ(read<Vec3d>(path(info), "water", "flux")[5].x, 5e-3);
+  const auto group = hdf5::File::open(path(info), H5F_ACC_RDONLY).open_group("water");
+  std::int64_t nz = 0;
+  Vec3d size{};
+  group.get("cells_z", nz), group.get("size", size);
+  EXPECT_EQ(nz, 3);
+  EXPECT_EQ(size, (Vec3d{3, 3, 1.5}));
+  EXPECT_EQ(info.water_size, size);
+}
+
+TEST_F(Snapshot, SaysNothingOfWaterWithoutWater) {
+  const Bed bed;
+  const SnapshotInfo info = write_snapshot(directory.path(), "a", 0, bed.scene, bed.state);
+  EXPECT_FALSE(hdf5::File::open(path(info), H5F_ACC_RDONLY).holds("water"));
+  write_xdmf(directory.path(), {info});
+  EXPECT_FALSE(exists(directory.path() / "water.xdmf"));
+  EXPECT_FALSE(exists(directory.path() / "bed.xdmf"));
+}
+
+// A dry step is left out; each other step has the height of its grid, and all data where it says.
+TEST_F(Snapshot, WaterOpensAsAGrid) {
+  Bed bed;
+  const SnapshotInfo dry = write_snapshot(directory.path(), "dry", 0, bed.scene, bed.state);
+  bed.state.water_force.assign(3, Vec3d{0, 0, 1});
+  std::vector<SnapshotInfo> snapshots{dry};
+  for (const double height : {1.5, 1.8})
+    snapshots.push_back(write_snapshot(directory.path(), "wet-" + std::to_string(snapshots.size()), height,
+                                       bed.scene, bed.state, water_of(height)));
+  write_xdmf(directory.path(), snapshots);
+  const auto script = std::filesystem::path(__FILE__).parent_path() / "open_xdmf.py";
+  for (const char* how : {"--xml", "--vtk"}) {
+    const std::string command = "python3 " + script.string() + " " + how + " " + directory.path().string();
+    const int status = WEXITSTATUS(std::system(command.c_str()));
+    EXPECT_TRUE(status == 0 || (status == 77 && std::string(how) == "--vtk")) << how << " " << status;
+  }
+}
+
 // Also with a step, or all steps, without contacts.
 TEST_F(Snapshot, OpensInVtk) {
   const auto script = std::filesystem::path(__FILE__).parent_path() / "open_xdmf.py";

@@ -1,0 +1,231 @@
+// Pore water in cases from start to end; what of it needs a build with pore water is skipped in others.
+#include <cmath>
+#include <csignal>
+#include <thread>
+
+#include "case/case.hpp"
+#include "coupling/pore_water.hpp"
+#include "output/hdf5.hpp"
+#include "program.hpp"
+#include "run/schedule.hpp"
+#include "run/stages.hpp"
+
+namespace moraine {
+namespace {
+
+using namespace std::chrono_literals;
+
+// A bed some five grains high: settled dry, consolidated with a drained top, sheared shut. The water is soft,
+// so that grains meet it only every few steps.
+std::string wet_case() {
+  return R"(
+[grains]
+count = 300
+columns_x = 5
+columns_y = 5
+cell = 1.1
+seed = 3
+[contact]
+k_n = "2e5 N/m"
+k_t = "2e5 N/m"
+mu_s = 0.5
+[wall]
+mass = "2 kg"
+[model]
+f = 0.1
+[fluid]
+compressibility = "1e-6 1/Pa"
+permeability_factor = "1e-8 m2"
+[[stage]]
+name = "settle"
+kind = "settle"
+duration = "0.4 s"
+f = 0.2
+gamma_n = 20
+wall_gamma_n = 40
+wall_gamma_t = 40
+[[stage]]
+name = "consolidate"
+kind = "consolidate"
+normal_stress = "2 kPa"
+duration = "0.15 s"
+gamma_n = 20
+wall_gamma_n = 40
+wall_gamma_t = 40
+fluid = true
+[[stage]]
+name = "shear"
+kind = "shear"
+normal_stress = "2 kPa"
+strain_rate = "0.5 1/s"
+strain = 0.05
+fluid = true
+fluid_top = "impermeable"
+[output]
+series_interval = "0.01 s"
+snapshot_interval = "0.05 s"
+checkpoint_interval = "0.02 s"
+)";
+}
+
+std::vector<output::Row> rows_of_stage(const fs::path& run, int stage) {
+  std::vector<output::Row> own;
+  for (const output::Row& r : output::read_series(series_of(run)))
+    if (r.stage == stage) own.push_back(r);
+  return own;
+}
+
+output::hdf5::File open_file(const fs::path& path) { return output::hdf5::File::open(path, H5F_ACC_RDONLY); }
+
+class Water : public Program {
+ protected:
+  void SetUp() override {
+    if (!coupling::water_built()) GTEST_SKIP() << "this build has no pore water in it";
+  }
+};
+
+TEST_F(Water, FromADryBedToUndrainedShear) {
+  const fs::path wet = make("wet", wet_case());
+  ASSERT_NO_FATAL_FAILURE(run(wet));
+  const auto end = output::read_checkpoint(checkpoint_of(wet));
+  const std::int64_t m = end.scene.exchange_interval;
+  ASSERT_GT(m, 0);
+  EXPECT_EQ(end.scene.fluid_density, 1000);
+  EXPECT_FALSE(end.water.q.empty());
+
+  for (const output::Row& r : rows_of_stage(wet, 0)) {
+    EXPECT_EQ(r.water_volume, 0);
+    EXPECT_EQ(r.total_friction, r.shear_friction);
+  }
+  for (int stage : {1, 2})
+    for (const output::Row& r : rows_of_stage(wet, stage)) {
+      EXPECT_GT(r.water_volume, 0);
+      EXPECT_LT(std::abs(r.water_balance), 1e-9 * r.water_volume);
+      EXPECT_TRUE(std::isfinite(r.total_friction));
+      EXPECT_LE(r.water_pressure_min, r.water_pressure_mean);
+      EXPECT_LE(r.water_pressure_mean, r.water_pressure_max);
+      const double total = r.normal_stress + r.wall_water_pressure;
+      if (total > 0) {
+        EXPECT_DOUBLE_EQ(r.total_friction, r.shear_stress / total);
+      }
+      EXPECT_LT(std::abs(r.residue), 0.1);
+    }
+  const auto drained = rows_of_stage(wet, 1), shut = rows_of_stage(wet, 2);
+  EXPECT_NE(drained.back().water_drained_top, 0);
+  EXPECT_LT(std::abs(shut.back().water_drained_top), 1e-15 * shut.back().water_volume);
+  EXPECT_NE(shut.back().wall_water_pressure, 0);
+  for (const output::Row& r : shut) EXPECT_EQ(static_cast<std::int64_t>(r.step) % m, 0);
+  EXPECT_NEAR(shut.back().stage_time, 0.1, 0.5 * static_cast<double>(m) * end.scene.dt * 1.001);
+
+  const auto file = open_file(snapshots_of(wet).back());
+  EXPECT_TRUE(file.holds("water"));
+  EXPECT_TRUE(file.open_group("grains").holds("water_force"));
+  EXPECT_FALSE(open_file(snapshots_of(wet).front()).holds("water"));
+  for (const char* name : {"water.xdmf", "bed.xdmf"})
+    EXPECT_TRUE(fs::exists(wet / "output/snapshots" / name)) << name;
+  const std::string log = contents(wet / "output/log.txt");
+  for (const char* word : {"water: ", "stable up to", "of it taken"})
+    EXPECT_NE(log.find(word), std::string::npos) << word;
+}
+
+TEST_F(Water, SameBitsAfterAnyBreak) {
+  const fs::path whole = make("whole", wet_case()), cut = make("cut", wet_case());
+  ASSERT_NO_FATAL_FAILURE(run(whole));
+  int breaks = 0;
+  for (bool over = false; !over && breaks < 40; ++breaks) {
+    auto words = to_run(cut);
+    if (fs::exists(cut / "output")) words.push_back("--resume");
+    const auto process = start(words);
+    std::this_thread::sleep_for(150ms + 37ms * breaks);
+    process->send(breaks % 2 ? SIGKILL : SIGTERM);
+    over = process->wait() == 0;
+  }
+  EXPECT_GT(breaks, 1);
+  if (breaks == 40) {
+    ASSERT_NO_FATAL_FAILURE(run(cut, {}, {"--resume"}));
+  }
+  expect_same_results(whole, cut);
+}
+
+TEST_F(Water, OnAnyNumberOfThreads) {
+  const fs::path one = make("one", wet_case()), two = make("two", wet_case());
+  ASSERT_NO_FATAL_FAILURE(run(one, {}, {"--threads", "1"}));
+  ASSERT_NO_FATAL_FAILURE(run(two, {}, {"--threads", "2"}));
+  expect_same_results(one, two);
+}
+
+// Pressures go on from stage to stage, and from a case to the one that starts from it; a dry stage ends them.
+TEST_F(Water, PressuresGoOn) {
+  const fs::path first = make("first", "stages = [\"settle\", \"consolidate\", \"shear\"]\n" + wet_case());
+  ASSERT_NO_FATAL_FAILURE(run(first));
+  const double left = rows_of_stage(first, 2).back().water_stored;
+  ASSERT_GT(left, 0);
+  const fs::path next = make("next", "start = \"../first\"\nstages = [\"shear\"]\n" + wet_case());
+  ASSERT_NO_FATAL_FAILURE(run(next));
+  EXPECT_NEAR(rows_of_stage(next, 0).front().water_stored / left, 1, 0.2);
+
+  const fs::path dry = make("dry", "start = \"../first\"\n" + wet_case());
+  ASSERT_NO_FATAL_FAILURE(run(dry, {"stages=[\"consolidate\"]", "stage.consolidate.fluid=false"}));
+  EXPECT_TRUE(output::read_checkpoint(checkpoint_of(dry)).water.q.empty());
+}
+
+TEST_F(Water, RefusesAnUnstableInterval) {
+  const fs::path wet = make("wet", "stages = [\"settle\"]\n" + wet_case());
+  expect_error(to_run(wet, {"stage.settle.fluid=true", "fluid.exchange_interval=1000"}),
+               {"fluid.exchange_interval = 1000: unstable", "expected at most"});
+  EXPECT_FALSE(fs::exists(wet / "output"));
+}
+
+TEST_F(Water, WarnsOfCellsThatMeasurePores) {
+  const fs::path wet = make("wet", wet_case());
+  const Outcome o = moraine({"check", wet.string(), "--threads", "1", "--set", "fluid.cells_x=5"});
+  ASSERT_EQ(o.status, 0) << o.err;
+  EXPECT_NE(o.out.find("along x"), std::string::npos) << o.out;
+  EXPECT_NE(o.out.find("measure pores"), std::string::npos) << o.out;
+}
+
+TEST_F(Water, ChecksACase) {
+  const fs::path wet = make("wet", wet_case());
+  const Outcome o = moraine({"check", wet.string(), "--threads", "1"});
+  ASSERT_EQ(o.status, 0) << o.err;
+  for (const char* word : {"exchange", "stable up to", "D = k/(mu phi beta)", "diffusion number",
+                           "c_v = ", "R = K_f/(phi M)", "Skempton B", "strain rate x H^2/c_v", "drained"})
+    EXPECT_NE(o.out.find(word), std::string::npos) << word << "\n" << o.out;
+}
+
+// Without the libraries a wet case is refused before anything is written, whichever of its stages is wet.
+TEST_F(Program, RefusesWaterThatIsNotBuilt) {
+  if (coupling::water_built()) GTEST_SKIP() << "this build has pore water in it";
+  const fs::path wet = make("wet", wet_case());
+  expect_error(to_run(wet), {"no pore water in it", "MORAINE_FLUID", "fluid.enabled"});
+  EXPECT_FALSE(fs::exists(wet / "output"));
+}
+
+// Whatever the interval, records, snapshots and the end are exchanges, each the nearest to its time, and each
+// once.
+TEST(WaterSchedule, EventsAreExchanges) {
+  for (const std::int64_t m : {1, 2, 7, 64}) {
+    run::Stage stage;
+    stage.scene.dt = 1.37e-4, stage.scene.exchange_interval = m;
+    stage.duration = 0.2, stage.series_interval = 0.01, stage.snapshot_interval = 0.05;
+    const double span = static_cast<double>(m) * stage.scene.dt;
+    std::int64_t step = 0;
+    int series = 0, snapshots = 0;
+    for (bool ended = false; !ended;) {
+      const run::Event event = run::next_event(stage, step);
+      ASSERT_GT(event.step, step);
+      ASSERT_EQ(event.step % m, 0);
+      EXPECT_LE(std::abs(stage.scene.time(event.step) - event.time), 0.5001 * span) << event.time;
+      step = event.step, ended = event.end;
+      series += event.series, snapshots += event.snapshot;
+    }
+    EXPECT_EQ(series, 20) << m;
+    EXPECT_EQ(snapshots, 4) << m;
+    EXPECT_EQ(step, run::last_step(stage));
+    EXPECT_EQ(run::at_exchange(stage, step), step);
+    EXPECT_EQ(run::at_exchange(stage, m + 1), m == 1 ? 2 : 2 * m);
+  }
+}
+
+}  // namespace
+}  // namespace moraine
