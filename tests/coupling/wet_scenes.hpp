@@ -26,28 +26,9 @@ inline double bed_top(const State& s) {
   return top;
 }
 
-// Takes away grains that nothing holds: with fewer than four contacts. Water pushes them about between their
-// neighbours (docs/decisions.md, "Loose grains"), which no answer in closed form knows of.
-inline void take_loose_away(State& s) {
-  std::vector<int> contacts(s.size(), 0);
-  for (const dem::Contact& c : s.contacts) ++contacts[c.i], ++contacts[c.j];
-  for (const dem::WallContact& c : s.wall_contacts) contacts[c.i] += 3;
-  State kept = s;
-  for (auto* v : {&kept.x, &kept.v, &kept.omega, &kept.rotation, &kept.force, &kept.torque, &kept.x_start})
-    v->clear();
-  kept.id.clear(), kept.r.clear(), kept.role.clear(), kept.contacts.clear(), kept.wall_contacts.clear();
-  for (dem::Index i = 0; i < s.size(); ++i) {
-    if (contacts[i] < 4) continue;
-    kept.id.push_back(kept.size()), kept.x.push_back(s.x[i]), kept.role.push_back(s.role[i]);
-    for (auto* v : {&kept.v, &kept.omega, &kept.rotation, &kept.force, &kept.torque}) v->push_back({0, 0, 0});
-    kept.x_start.push_back(s.x[i]), kept.r.push_back(s.r[i]);
-  }
-  s = kept;
-}
-
 // Grains of 2 cm settled under gravity, x and y periodic; then, with a stress, pressed by a wall without
 // gravity. At rest.
-inline WetBed make_bed(int count, int columns, double normal_stress, bool without_loose = false) {
+inline WetBed make_bed(int count, int columns, double normal_stress) {
   dem::Packing p;
   p.count = count, p.columns_x = p.columns_y = columns;
   p.radius_mean = 0.01, p.radius_std = 0.0008, p.cell = 1.05, p.seed = 5;
@@ -72,12 +53,9 @@ inline WetBed make_bed(int count, int columns, double normal_stress, bool withou
     dem::synchronise(s, state);
     // Locked, so that it is elastic and comes to rest: sliding contacts creep for long.
     s.grain.mu_s = s.grain.mu_d = s.wall.mu_s = s.wall.mu_d = 100;
-    for (int k = 0; k < (without_loose ? 4 : 1); ++k) {
-      if (without_loose) take_loose_away(state);
-      stop(state);
-      state = dem::run(*engine, s, state, k < 3 && without_loose ? 20000 : 60000);
-      dem::synchronise(s, state);
-    }
+    stop(state);
+    state = dem::run(*engine, s, state, 30000);
+    dem::synchronise(s, state);
     stop(state);
   }
   dem::sort_spatially(s, state);
@@ -92,7 +70,7 @@ inline const WetBed& pressed_bed() {
 }
 // A column for one-dimensional problems: as many, 0.11 m wide and half a metre high.
 inline const WetBed& tall_bed() {
-  static const WetBed bed = make_bed(900, 5, 1e4, /*without_loose=*/true);
+  static const WetBed bed = make_bed(900, 5, 1e4);
   return bed;
 }
 inline const WetBed& heavy_bed() {  // settled, without a wall
