@@ -2,16 +2,25 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <map>
-#include <numeric>
 
 #include "dem/scene.hpp"
 
 namespace moraine::coupling {
 
+using dem::Vec3d;
+
+// The eight points around a grain.
+struct Mapping::Stencil {
+  std::array<Index, 8> point;
+  std::array<double, 8> w;  // hats, later weights b in m2
+  std::array<Vec3d, 8> xi;  // from the point, in cells
+};
+
 namespace {
 
-using dem::Vec3d;
+using Stencil = Mapping::Stencil;
 
 // Two neighbours on a line of points, and the hat weight of the second.
 struct Pair {
@@ -44,12 +53,6 @@ Pair between_cells(double s, int n, bool periodic) {
   const int low = static_cast<int>(s);
   return {low, low + 1, s - low};
 }
-
-struct Stencil {
-  std::array<Index, 8> point;
-  std::array<double, 8> w;
-  std::array<Vec3d, 8> xi;  // from the point, in cells
-};
 
 // axis: of the faces, or -1 for cell centres.
 Stencil stencil(const fluid::Grid& g, int axis, const Vec3d& x) {
@@ -96,6 +99,10 @@ struct Moments {
     m2[0] += v * xi.x * xi.x, m2[1] += v * xi.y * xi.y, m2[2] += v * xi.z * xi.z;
     m2[3] += v * xi.x * xi.y, m2[4] += v * xi.x * xi.z, m2[5] += v * xi.y * xi.z;
   }
+  void add(double share, const Moments& m) {
+    m0 += share * m.m0, m1 += share * m.m1;
+    for (int k = 0; k < 6; ++k) m2[k] += share * m.m2[k];
+  }
 };
 
 // a with M2 a = -M1, without the component `skip` (-1: none), shortened where grains are few.
@@ -126,222 +133,266 @@ Vec3d affine_correction(const Moments& m, double psi, int skip) {
   return (fade * (steepest > 2 ? 2 / steepest : 1)) * x;
 }
 
+std::vector<Stencil> stencils_of(const fluid::Grid& grid, int axis, const std::vector<Vec3d>& x) {
+  std::vector<Stencil> out(x.size());
+  for (std::size_t i = 0; i < x.size(); ++i) out[i] = stencil(grid, axis, x[i]);
+  return out;
+}
+
+// Grains that are squeezed hardly less than those around them, and held ones.
+std::vector<bool> bearing(const fluid::Grid& grid, const std::vector<Stencil>& cells,
+                          const dem::GrainRow* grains, const std::vector<double>& squeeze) {
+  std::vector<double> solid(grid.cells(), 0), squeezed(grid.cells(), 0);  // m3, m4
+  for (std::size_t i = 0; i < cells.size(); ++i)
+    for (int k = 0; k < 8; ++k) {
+      const double v = dem::sphere_volume(grains[i].r) * cells[i].w[k];
+      solid[cells[i].point[k]] += v, squeezed[cells[i].point[k]] += v * squeeze[i];
+    }
+  std::vector<bool> bears(cells.size());
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    double around = 0;
+    for (int k = 0; k < 8; ++k) {
+      const Index c = cells[i].point[k];
+      if (solid[c] > 0) around += cells[i].w[k] * squeezed[c] / solid[c];
+    }
+    const bool held = grains[i].inverse_inertia == 0;
+    bears[i] = held || (squeeze[i] > 0 && squeeze[i] >= Mapping::loose_below * around);
+  }
+  return bears;
+}
+
 }  // namespace
 
 void Mapping::build(const fluid::Grid& grid, const std::array<bool, 3>& open_low,
                     const std::array<bool, 3>& open_high, const dem::GrainRow* grains,
-                    const std::vector<Vec3d>& x, const std::vector<bool>& top_layer) {
-  n_ = static_cast<Index>(x.size());
-  const Index size = dem::chunk_size(n_);
-  chunks_.assign(static_cast<std::size_t>(dem::chunk_count(n_)), {});
+                    const std::vector<Vec3d>& x, const std::vector<double>& squeeze,
+                    const std::vector<bool>& top_layer) {
+  const auto n = static_cast<Index>(x.size());
+  const Index size = dem::chunk_size(n);
+  chunks_.assign(static_cast<std::size_t>(dem::chunk_count(n)), {});
+  for (Index c = 0; c < chunks(); ++c)
+    chunks_[c].begin = c * size, chunks_[c].end = std::min(n, (c + 1) * size);
+  weights_.resize(n);
 
-  std::vector<double> solid(grid.cells(), 0);
-  for (Index i = 0; i < n_; ++i) {
-    const Stencil s = stencil(grid, -1, x[i]);
-    for (int k = 0; k < 8; ++k) solid[s.point[k]] += dem::sphere_volume(grains[i].r) * s.w[k];
-  }
-  phi_.resize(grid.cells());
-  for (std::size_t c = 0; c < phi_.size(); ++c) phi_[c] = 1 - solid[c] / grid.cell_volume();
+  const std::vector<Stencil> cells = stencils_of(grid, -1, x);
+  phi_.assign(grid.cells(), 1);
+  for (Index i = 0; i < n; ++i)
+    for (int k = 0; k < 8; ++k)
+      phi_[cells[i].point[k]] -= dem::sphere_volume(grains[i].r) * cells[i].w[k] / grid.cell_volume();
+  const std::vector<bool> bears = bearing(grid, cells, grains, squeeze);
 
-  std::vector<Stencil> stencils(n_);
-  std::vector<double> exact, rounded;  // sums of b over each face
   for (int axis = 0; axis < 3; ++axis) {
-    const std::size_t faces = grid.face_count(axis);
-    std::vector<Moments> moments(faces);
-    for (Index i = 0; i < n_; ++i) {
-      stencils[i] = stencil(grid, axis, x[i]);
-      const double v = dem::sphere_volume(grains[i].r);
-      for (int k = 0; k < 8; ++k) moments[stencils[i].point[k]].add(v * stencils[i].w[k], stencils[i].xi[k]);
-    }
-    std::vector<Vec3d> slope(faces, {0, 0, 0});
-    std::vector<double> scale(faces, 0);  // A/W; 0 at closed sides
-    psi_[axis].assign(faces, 0), layer_[axis].assign(faces, 0);
-    exact.assign(faces, 0), rounded.assign(faces, 0);
-    const double area = grid.face_area(axis), volume = grid.cell_volume();
-    for (int k = 0; k < (axis == 2 ? grid.faces(2) : grid.n[2]); ++k)
-      for (int j = 0; j < (axis == 1 ? grid.faces(1) : grid.n[1]); ++j)
-        for (int i = 0; i < (axis == 0 ? grid.faces(0) : grid.n[0]); ++i) {
-          const std::size_t f = grid.face(axis, i, j, k);
-          const int at = axis == 0 ? i : axis == 1 ? j : k;
-          const bool side = !grid.periodic[axis] && (at == 0 || at == grid.n[axis]);
-          const Moments& m = moments[f];
-          const double hat = (side ? 0.5 : 1.0) * volume;
-          psi_[axis][f] = m.m0 / hat;
-          if (side && !(at == 0 ? open_low : open_high)[axis]) continue;
-          slope[f] = affine_correction(m, psi_[axis][f], side ? axis : -1);
-          const double w = std::max(m.m0 + dot(slope[f], m.m1), psi_min * hat);
-          scale[f] = area / w, psi_[axis][f] = w / hat;
-        }
-
-    for (Index c = 0; c < chunks(); ++c) {
-      Axis& a = chunks_[c].axis[axis];
-      const Index begin = c * size, end = std::min(n_, begin + size);
-      std::vector<Index> order(end - begin);
-      std::iota(order.begin(), order.end(), begin);
-      const auto first_face = [&](Index i) { return stencils[i].point; };
-      std::stable_sort(order.begin(), order.end(),
-                       [&](Index p, Index q) { return first_face(p) < first_face(q); });
-      std::map<Index, Index> slot_of;
-      for (std::size_t k = 0; k < order.size();) {
-        Bin bin;
-        bin.face = first_face(order[k]);
-        for (int e = 0; e < 8; ++e) {
-          const auto [found, fresh] = slot_of.try_emplace(bin.face[e], static_cast<Index>(a.face.size()));
-          if (fresh) a.face.push_back(bin.face[e]);
-          bin.slot[e] = found->second;
-        }
-        bin.first = static_cast<Index>(a.packs.size());
-        int lane = 0;
-        for (; k < order.size() && first_face(order[k]) == bin.face; ++k, ++lane) {
-          const Index i = order[k];
-          if (lane % 4 == 0) {
-            Lane4& fresh = a.packs.emplace_back();
-            fresh.b.fill({0, 0, 0, 0}), fresh.grain.fill(i);
-          }
-          Lane4& pack = a.packs.back();
-          pack.grain[lane % 4] = i;
-          for (int e = 0; e < 8; ++e) {
-            const Index f = bin.face[e];
-            const double b = scale[f] * dem::sphere_volume(grains[i].r) * stencils[i].w[e] *
-                             (1 + dot(slope[f], stencils[i].xi[e]));
-            pack.b[e][lane % 4] = static_cast<float>(b);
-            exact[f] += b, rounded[f] += pack.b[e][lane % 4];
-            if (top_layer[i]) layer_[axis][f] += pack.b[e][lane % 4];
-          }
-        }
-        bin.packs = static_cast<Index>(a.packs.size()) - bin.first;
-        bin.in_last = (lane - 1) % 4 + 1;
-        a.bins.push_back(bin);
-      }
-      a.sum.assign(a.face.size(), 0);
-    }
-    scale_[axis].assign(faces, 0);
-    for (std::size_t f = 0; f < faces; ++f)
-      if (rounded[f] != 0) scale_[axis][f] = exact[f] / rounded[f];
+    std::vector<Stencil> faces = stencils_of(grid, axis, x);
+    weigh(grid, axis, open_low[axis], open_high[axis], grains, bears, faces);
+    round(axis, faces, top_layer);
+    lay_out(axis, faces);
+  }
+  for (Chunk& c : chunks_) {
+    c.first_octet[3] = static_cast<Index>(c.octets.size()),
+    c.first_slot[3] = static_cast<Index>(c.face.size());
+    c.sum.assign(c.face.size(), 0);
   }
   start_from(x);
 }
 
-void Mapping::start_from(const std::vector<Vec3d>& x) {
-  for (Chunk& chunk : chunks_)
-    for (int axis = 0; axis < 3; ++axis) {
-      Axis& a = chunk.axis[axis];
-      a.last.resize(a.packs.size());
-      for (std::size_t p = 0; p < a.packs.size(); ++p)
-        for (int k = 0; k < 4; ++k) a.last[p].v[k] = x[a.packs[p].grain[k]][axis];
+// Makes the hats of `faces` weights b; and psi_ of the axis.
+void Mapping::weigh(const fluid::Grid& grid, int axis, bool open_low, bool open_high,
+                    const dem::GrainRow* grains, const std::vector<bool>& bears,
+                    std::vector<Stencil>& faces) {
+  const std::size_t count = grid.face_count(axis), n = faces.size();
+  std::vector<Moments> moments(count), loose(count);
+  for (std::size_t i = 0; i < n; ++i) {
+    const double v = dem::sphere_volume(grains[i].r);
+    std::vector<Moments>& kind = bears[i] ? moments : loose;
+    for (int k = 0; k < 8; ++k) kind[faces[i].point[k]].add(v * faces[i].w[k], faces[i].xi[k]);
+  }
+  std::vector<Vec3d> slope(count, {0, 0, 0});
+  std::vector<double> scale(count, 0);        // A/W; 0 at closed sides
+  std::vector<double> loose_share(count, 0);  // of a loose grain's volume that counts
+  psi_[axis].assign(count, 0);
+  const double area = grid.face_area(axis), volume = grid.cell_volume();
+  for (int k = 0; k < (axis == 2 ? grid.faces(2) : grid.n[2]); ++k)
+    for (int j = 0; j < (axis == 1 ? grid.faces(1) : grid.n[1]); ++j)
+      for (int i = 0; i < (axis == 0 ? grid.faces(0) : grid.n[0]); ++i) {
+        const std::size_t f = grid.face(axis, i, j, k);
+        const int at = axis == 0 ? i : axis == 1 ? j : k;
+        const bool side = !grid.periodic[axis] && (at == 0 || at == grid.n[axis]);
+        Moments& m = moments[f];
+        const double hat = (side ? 0.5 : 1.0) * volume, solids = m.m0 + loose[f].m0;
+        psi_[axis][f] = solids / hat;
+        if (solids == 0) continue;
+        loose_share[f] = std::clamp(3 - 5 * m.m0 / solids, 0.0, 1.0);
+        m.add(loose_share[f], loose[f]);
+        if (side && !(at == 0 ? open_low : open_high)) continue;
+        slope[f] = affine_correction(m, m.m0 / hat, side ? axis : -1);
+        const double few = std::max(1.0, psi_min * hat / solids);
+        scale[f] = area / (few * (m.m0 + dot(slope[f], m.m1))), psi_[axis][f] *= few;
+      }
+  for (std::size_t i = 0; i < n; ++i)
+    for (int e = 0; e < 8; ++e) {
+      const Index f = faces[i].point[e];
+      const double counts = bears[i] ? 1 : loose_share[f];
+      faces[i].w[e] *=
+          scale[f] * counts * dem::sphere_volume(grains[i].r) * (1 + dot(slope[f], faces[i].xi[e]));
     }
+}
+
+void Mapping::round(int axis, const std::vector<Stencil>& faces, const std::vector<bool>& top_layer) {
+  constexpr double most = 32767;
+  const std::size_t count = psi_[axis].size();
+  std::vector<double> largest(count, 0), exact(count, 0), rounded(count, 0);  // the last two: sums
+  for (const Stencil& s : faces)
+    for (int e = 0; e < 8; ++e) {
+      largest[s.point[e]] = std::max(largest[s.point[e]], std::abs(s.w[e]));
+      exact[s.point[e]] += s.w[e];
+    }
+  layer_[axis].assign(count, 0);
+  for (std::size_t i = 0; i < faces.size(); ++i)
+    for (int e = 0; e < 8; ++e) {
+      const Index f = faces[i].point[e];
+      std::int16_t& b = weights_[i].b[axis][e];
+      b = largest[f] > 0 ? static_cast<std::int16_t>(std::lround(most * faces[i].w[e] / largest[f])) : 0;
+      rounded[f] += b;
+      if (top_layer[i]) layer_[axis][f] += b;
+    }
+  scale_[axis].assign(count, 0);
+  for (std::size_t f = 0; f < count; ++f)
+    if (rounded[f] != 0) scale_[axis][f] = exact[f] / rounded[f];
+}
+
+void Mapping::lay_out(int axis, const std::vector<Stencil>& faces) {
+  std::vector<Index> slot_of(psi_[axis].size(), -1);
+  for (Chunk& c : chunks_) {
+    c.first_octet[axis] = static_cast<Index>(c.octets.size());
+    c.first_slot[axis] = static_cast<Index>(c.face.size());
+    std::map<std::array<Index, 2>, std::uint16_t> octet_of;  // by the first face and the last
+    for (Index i = c.begin; i < c.end; ++i) {
+      const auto& point = faces[i].point;
+      const auto [found, fresh] =
+          octet_of.try_emplace({point[0], point[7]}, static_cast<std::uint16_t>(c.octets.size()));
+      weights_[i].octet[axis] = found->second;
+      if (!fresh) continue;
+      Octet& o = c.octets.emplace_back();
+      o.face = point;
+      for (int e = 0; e < 8; ++e) {
+        Index& slot = slot_of[point[e]];
+        if (slot < 0) slot = static_cast<Index>(c.face.size()), c.face.push_back(point[e]);
+        o.slot[e] = slot;
+      }
+    }
+    for (auto s = static_cast<std::size_t>(c.first_slot[axis]); s < c.face.size(); ++s)
+      slot_of[c.face[s]] = -1;
+  }
+}
+
+void Mapping::start_from(const std::vector<Vec3d>& x) {
+  last_.resize(x.size());
+  for (std::size_t i = 0; i < x.size(); ++i) last_[i] = Pack(x[i].x, x[i].y, x[i].z, 0);
+}
+
+void Mapping::start_from(Index c, const dem::GrainRow* grains) {
+  for (Index i = chunks_[c].begin; i < chunks_[c].end; ++i) last_[i] = Pack::load(&grains[i].x.x);
 }
 
 std::vector<Vec3d> Mapping::last() const {
-  std::vector<Vec3d> x(n_);
-  for (const Chunk& chunk : chunks_)
-    for (int axis = 0; axis < 3; ++axis) {
-      const Axis& a = chunk.axis[axis];
-      for (std::size_t p = 0; p < a.packs.size(); ++p)
-        for (int k = 0; k < 4; ++k) x[a.packs[p].grain[k]][axis] = a.last[p][k];
-    }
+  std::vector<Vec3d> x(last_.size());
+  for (std::size_t i = 0; i < x.size(); ++i) x[i] = {last_[i][0], last_[i][1], last_[i][2]};
   return x;
 }
 
-Pack Mapping::Lane4::weight(int e) const {
+// Four of a grain's weights.
+Pack Mapping::Weights::of(int axis, int half) const {
+  const std::int16_t* const w = b[axis].data() + 4 * half;
 #if defined(__AVX__)
-  return _mm256_cvtps_pd(_mm_loadu_ps(b[e].data()));
+  std::int64_t bits;
+  std::memcpy(&bits, w, sizeof bits);
+  return _mm256_cvtepi32_pd(_mm_cvtepi16_epi32(_mm_cvtsi64_si128(bits)));
 #else
-  return {b[e][0], b[e][1], b[e][2], b[e][3]};
+  return Pack(w[0], w[1], w[2], w[3]);
 #endif
 }
 
-// displacement(axis, list of the axis, number of the pack): Pack, m.
+// displacement(grain): Pack with x, y, z in its first three lanes, in units of `unit`, m.
 template <class Displacement>
-void Mapping::add_up(Index c, Displacement&& displacement) {
-  Chunk& chunk = chunks_[c];
+void Mapping::add_up(Index chunk, double unit, Displacement&& displacement) {
+  Chunk& c = chunks_[chunk];
+  static thread_local std::vector<std::array<Pack, 2>> room;
+  room.assign(c.octets.size(), {Pack(0.0), Pack(0.0)});
+  std::array<Pack, 2>* const octet = room.data();
   Pack most(0.0);
-  for (int axis = 0; axis < 3; ++axis) {
-    Axis& a = chunk.axis[axis];
-    std::fill(a.sum.begin(), a.sum.end(), 0.0);
-    for (const Bin& bin : a.bins) {
-      std::array<Pack, 8> sum;
-      sum.fill(Pack(0.0));
-      for (Index p = bin.first; p < bin.first + bin.packs; ++p) {
-        const Pack d = displacement(axis, a, p);
-        most = max(max(d, -d), most);
-        for (int e = 0; e < 8; ++e) sum[e] = fma(a.packs[p].weight(e), d, sum[e]);
-      }
-      for (int e = 0; e < 8; e += 4) {
-        transpose(sum[e], sum[e + 1], sum[e + 2], sum[e + 3]);
-        const Pack total = (sum[e] + sum[e + 1]) + (sum[e + 2] + sum[e + 3]);
-        for (int k = 0; k < 4; ++k) a.sum[bin.slot[e + k]] += total[k];
-      }
+  for (Index i = c.begin; i < c.end; ++i) {
+    const Pack d = displacement(i);
+    most = max(max(d, -d), most);
+    const Weights& w = weights_[i];
+    for (int axis = 0; axis < 3; ++axis) {
+      std::array<Pack, 2>& to = octet[w.octet[axis]];
+      const Pack along(d[axis]);
+      to[0] = fma(w.of(axis, 0), along, to[0]), to[1] = fma(w.of(axis, 1), along, to[1]);
     }
   }
-  chunk.moved = std::max({most[0], most[1], most[2], most[3]});
+  std::fill(c.sum.begin(), c.sum.end(), 0.0);
+  for (std::size_t o = 0; o < c.octets.size(); ++o)
+    for (int e = 0; e < 8; ++e) c.sum[c.octets[o].slot[e]] += octet[o][e / 4][e % 4];
+  for (double& sum : c.sum) sum *= unit;
+  c.moved = unit * std::max({most[0], most[1], most[2]});
 }
 
 void Mapping::displace(Index c, const dem::GrainRow* grains) {
-  add_up(c, [grains](int axis, Axis& a, Index p) {
-    const std::array<Index, 4>& i = a.packs[p].grain;
-    const Pack x(grains[i[0]].x[axis], grains[i[1]].x[axis], grains[i[2]].x[axis], grains[i[3]].x[axis]);
-    const Pack d = x - a.last[p];
-    a.last[p] = x;
-    return d;
-  });
+  add_up(c, 1, [&](Index i) { return Pack::load(&grains[i].x.x) - last_[i]; });
 }
 
 void Mapping::displace(Index c, const dem::GrainRow* grains, double dt) {
-  add_up(c, [grains, dt](int axis, const Axis& a, Index p) {
-    const std::array<Index, 4>& i = a.packs[p].grain;
-    return Pack(dt) *
-           Pack(grains[i[0]].v[axis], grains[i[1]].v[axis], grains[i[2]].v[axis], grains[i[3]].v[axis]);
-  });
+  add_up(c, dt, [grains](Index i) { return Pack::load(&grains[i].v.x); });
 }
 
 double Mapping::collect(Faces& u) const {
   double moved = 0;
   for (auto& axis : u) std::fill(axis.begin(), axis.end(), 0.0);
-  for (const Chunk& chunk : chunks_) {
+  for (const Chunk& c : chunks_) {
     for (int axis = 0; axis < 3; ++axis) {
-      const Axis& a = chunk.axis[axis];
       double* const to = u[axis].data();
-      for (std::size_t s = 0; s < a.face.size(); ++s) to[a.face[s]] += a.sum[s];
+      for (Index s = c.first_slot[axis]; s < c.first_slot[axis + 1]; ++s) to[c.face[s]] += c.sum[s];
     }
-    moved = std::max(moved, chunk.moved);
+    moved = std::max(moved, c.moved);
   }
   for (int axis = 0; axis < 3; ++axis)
     for (std::size_t f = 0; f < u[axis].size(); ++f) u[axis][f] *= scale_[axis][f];
   return moved;
 }
 
-void Mapping::push(Index c, const Faces& g, dem::WaterRow* force) const {
-  const Chunk& chunk = chunks_[c];
+void Mapping::push(Index chunk, const Faces& g, dem::WaterRow* force) const {
+  const Chunk& c = chunks_[chunk];
+  static thread_local std::vector<std::array<Pack, 2>> room;
+  room.resize(c.octets.size());
+  std::array<Pack, 2>* const octet = room.data();
   for (int axis = 0; axis < 3; ++axis) {
-    const Axis& a = chunk.axis[axis];
     const double* const of = g[axis].data();
-    for (const Bin& bin : a.bins) {
-      std::array<Pack, 8> at;
-      for (int e = 0; e < 8; ++e) at[e] = Pack(of[bin.face[e]]);
-      for (Index p = bin.first; p < bin.first + bin.packs; ++p) {
-        const Lane4& pack = a.packs[p];
-        Pack f = pack.weight(0) * at[0], rest = pack.weight(1) * at[1];
-        for (int e = 2; e < 8; e += 2)
-          f = fma(pack.weight(e), at[e], f), rest = fma(pack.weight(e + 1), at[e + 1], rest);
-        f += rest;
-        const int lanes = p + 1 < bin.first + bin.packs ? 4 : bin.in_last;
-        for (int k = 0; k < lanes; ++k) force[pack.grain[k]].f[axis] = f[k];
-      }
+    for (Index o = c.first_octet[axis]; o < c.first_octet[axis + 1]; ++o) {
+      const std::array<Index, 8>& f = c.octets[o].face;
+      octet[o] = {Pack(of[f[0]], of[f[1]], of[f[2]], of[f[3]]), Pack(of[f[4]], of[f[5]], of[f[6]], of[f[7]])};
     }
+  }
+  for (Index i = c.begin; i < c.end; ++i) {
+    const Weights& w = weights_[i];
+    Pack f[4];
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::array<Pack, 2>& at = octet[w.octet[axis]];
+      f[axis] = fma(w.of(axis, 0), at[0], w.of(axis, 1) * at[1]);
+    }
+    f[3] = Pack(0.0);
+    transpose(f[0], f[1], f[2], f[3]);
+    ((f[0] + f[1]) + (f[2] + f[3])).store(&force[i].f.x);
   }
 }
 
 void Mapping::apply(const std::vector<Vec3d>& d, Faces& u) const {
   for (auto& axis : u) std::fill(axis.begin(), axis.end(), 0.0);
-  for (const Chunk& chunk : chunks_)
-    for (int axis = 0; axis < 3; ++axis)
-      for (const Bin& bin : chunk.axis[axis].bins)
-        for (Index p = bin.first; p < bin.first + bin.packs; ++p) {
-          const Lane4& pack = chunk.axis[axis].packs[p];
-          for (int k = 0; k < 4; ++k)  // lanes that hold no grain have no weight
-            for (int e = 0; e < 8; ++e)
-              u[axis][bin.face[e]] += scale_[axis][bin.face[e]] * (pack.b[e][k] * d[pack.grain[k]][axis]);
+  for (const Chunk& c : chunks_)
+    for (Index i = c.begin; i < c.end; ++i)
+      for (int axis = 0; axis < 3; ++axis)
+        for (int e = 0; e < 8; ++e) {
+          const Index f = c.octets[weights_[i].octet[axis]].face[e];
+          u[axis][f] += scale_[axis][f] * (weights_[i].b[axis][e] * d[i][axis]);
         }
 }
 

@@ -10,11 +10,17 @@
 // side. Where there are few grains (a solid fraction below 0.2) a_f fades away, and below psi_min forces do,
 // lest a lonely grain carry a whole face.
 //
+// Loose grains have no weights. What the flow presses on a grain that nothing holds, its neighbours bear as
+// soon as it leans on them; were it pushed alone it would fly ahead, and carry the solids' share of the flow
+// with it, for the drag of the mean flow does not slow it down. Where most grains are loose (a bed that lifts
+// off) they count like all others: in part once more than 0.4 of the solids about a face are loose, fully
+// from 0.6 on.
+//
 // The weights stay as they are until grains have moved by a hundredth of a cell (PoreWater); so long the sums
-// are plain products over lists, by chunk of grains (grain.hpp) and within it by the eight faces that grains
-// share, four grains at a time.
+// are products with a sparse matrix, by chunk of grains (grain.hpp) and within it over eight faces at a time.
 #pragma once
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "backend/number.hpp"
@@ -31,19 +37,24 @@ using Faces = std::array<std::vector<double>, 3>;
 class Mapping {
  public:
   static constexpr double psi_min = 0.1;
+  static constexpr double loose_below = 0.1;  // of the mean squeeze around it a grain is loose
 
-  // open_low, open_high: whether solids may be pushed at the sides along z, where water passes (others are
-  // closed).
+  struct Stencil;
+
+  // squeeze: m, sum of the overlaps of each grain, by which loose ones are told. open_low, open_high: whether
+  // solids may be pushed at the sides along z, where water passes (others are closed).
   void build(const fluid::Grid& grid, const std::array<bool, 3>& open_low,
              const std::array<bool, 3>& open_high, const dem::GrainRow* grains,
-             const std::vector<dem::Vec3d>& x, const std::vector<bool>& top_layer);
+             const std::vector<dem::Vec3d>& x, const std::vector<double>& squeeze,
+             const std::vector<bool>& top_layer);
   // Displacements are counted from here, memory order.
   void start_from(const std::vector<dem::Vec3d>& x);
+  void start_from(Index chunk, const dem::GrainRow* grains);
   std::vector<dem::Vec3d> last() const;  // where they are counted from now
 
   Index chunks() const { return static_cast<Index>(chunks_.size()); }
-  // Adds up a chunk's part of U: since the last call, and moves on; or at present velocities for a time dt,
-  // s. Chunks may be done by different threads.
+  // Adds up a chunk's part of U: since start_from(), or at present velocities for a time dt, s. Chunks may be
+  // done by different threads.
   void displace(Index chunk, const dem::GrainRow* grains);
   void displace(Index chunk, const dem::GrainRow* grains, double dt);
   // U of all chunks, in their order; and the largest displacement of any grain along an axis, m.
@@ -57,43 +68,45 @@ class Mapping {
   // What U and g of each face are multiplied with, outside of these sums.
   const Faces& scale() const { return scale_; }
   const Faces& layer() const { return layer_; }         // m2, sum of b over the grains of the top layer
-  const Faces& solid_fraction() const { return psi_; }  // 1, about each face: W_f over the volume of w
+  const Faces& solid_fraction() const { return psi_; }  // 1, about each face; where there are grains, psi_min at least
   const std::vector<double>& porosity() const { return phi_; }  // of each cell, by hats about its centre
 
  private:
-  struct Bin {
+  // Weights of a grain for the eight faces around it along each axis, in units of scale() and rounded to 16
+  // bits: they are read twice in a step, and memory is what that takes time for. Both ways use the same ones,
+  // and scale() puts their sum over a face right again, so that rigid motion and momentum are exact all the
+  // same.
+  struct Weights {
+    std::array<std::array<std::int16_t, 8>, 3> b;
+    std::array<std::uint16_t, 3> octet;  // of the chunk
+
+    Pack of(int axis, int half) const;
+  };
+  // Eight faces that grains share.
+  struct Octet {
     std::array<Index, 8> face;  // of the grid
     std::array<Index, 8> slot;  // of the chunk's own sums
-    Index first, packs;
-    int in_last;  // grains in the last pack
-  };
-  // Four grains. The weights are rounded to single precision: they are read twice in a step, and memory is
-  // what that takes time for. Both ways use the same ones, and scale() puts their sum over a face right
-  // again, so that rigid motion and momentum are exact all the same.
-  struct Lane4 {
-    std::array<std::array<float, 4>, 8> b;  // m2
-    std::array<Index, 4> grain;
-
-    Pack weight(int e) const;
-  };
-  struct Axis {
-    std::vector<Bin> bins;
-    std::vector<Lane4> packs;
-    std::vector<Pack> last;   // m, of each pack
-    std::vector<Index> face;  // of each slot
-    std::vector<double> sum;
   };
   struct alignas(64) Chunk {
-    std::array<Axis, 3> axis;
+    Index begin, end;                              // grains
+    std::vector<Octet> octets;                     // of all axes, one after another
+    std::array<Index, 4> first_octet, first_slot;  // of each axis
+    std::vector<Index> face;                       // of each slot
+    std::vector<double> sum;
     double moved = 0;
   };
+  void weigh(const fluid::Grid& grid, int axis, bool open_low, bool open_high, const dem::GrainRow* grains,
+             const std::vector<bool>& bears, std::vector<Stencil>& faces);
+  void round(int axis, const std::vector<Stencil>& faces, const std::vector<bool>& top_layer);
+  void lay_out(int axis, const std::vector<Stencil>& faces);
   template <class Displacement>
-  void add_up(Index chunk, Displacement&& displacement);
+  void add_up(Index chunk, double unit, Displacement&& displacement);
 
   std::vector<Chunk> chunks_;
+  std::vector<Weights> weights_;  // memory order
+  std::vector<Pack> last_;        // m
   Faces layer_, psi_, scale_;
   std::vector<double> phi_;
-  Index n_ = 0;
 };
 
 }  // namespace moraine::coupling

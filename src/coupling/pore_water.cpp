@@ -6,6 +6,7 @@
 
 #include "coupling/mapping.hpp"
 #include "dem/engine_parts.hpp"
+#include "dem/neighbours.hpp"
 #include "dem/spectrum.hpp"
 #include "error.hpp"
 #include "fluid/step.hpp"
@@ -69,6 +70,15 @@ class GridWater final : public PoreWater {
     const std::vector<Vec3d> last = mapping_.last();
     std::vector<Vec3d> x(x_.size());
     for (std::size_t i = 0; i < x.size(); ++i) x[i] = grains[i].x;
+    // The sum of the largest ways is longer than that of any grain.
+    double moved = 0;
+    for (std::size_t i = 0; i < x.size(); ++i)
+      for (int a = 0; a < 3; ++a) moved = std::max(moved, std::abs(x[i][a] - now_.x_map[i][a]));
+    if (has_wall(scene_)) moved += std::abs(drive.wall_z - now_.height_map);
+    if (moved < 0.5 * map_lasts * least_cell()) {
+      now_.moved = moved;
+      return;
+    }
     if (has_wall(scene_)) grid_.length[2] = drive.wall_z;
     map(x);
     mapping_.start_from(last);
@@ -138,7 +148,10 @@ class GridWater final : public PoreWater {
     return out;
   }
 
-  void push(dem::Index chunk, dem::WaterRow* force) override { mapping_.push(chunk, push_, force); }
+  void push(dem::Index chunk, const dem::GrainRow* grains, dem::WaterRow* force) override {
+    mapping_.push(chunk, push_, force);
+    if (interval_ > 1) mapping_.start_from(chunk, grains);
+  }
 
   std::int64_t interval() const override { return interval_; }
   Stability stability() const override { return stability_; }
@@ -257,7 +270,7 @@ class GridWater final : public PoreWater {
       low[a] = side(a, false).kind != fluid::Side::Kind::closed;
       high[a] = side(a, true).kind != fluid::Side::Kind::closed;
     }
-    mapping_.build(grid_, low, high, grains_.data(), x, top_layer_);
+    mapping_.build(grid_, low, high, grains_.data(), x, squeeze(x), top_layer_);
     now_.x_map = x, now_.height_map = grid_.length[2], now_.moved = 0;
     medium_.viscosity = water_.viscosity, medium_.compressibility = water_.compressibility;
     medium_.porosity = mapping_.porosity();
@@ -268,6 +281,22 @@ class GridWater final : public PoreWater {
       medium_.permeability[c] = water_.k_c * phi * phi * phi / ((1 - phi) * (1 - phi));
     }
     step_.set(grid_, medium_);
+  }
+
+  // m, sum of each grain's overlaps, as good as that of its normal forces.
+  std::vector<double> squeeze(const std::vector<Vec3d>& x) {
+    std::vector<double> sum(x.size(), 0);
+    double r_max = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      dem::GrainRow& g = grains_[i];
+      g.x = x[i], r_max = std::max(r_max, g.r);
+      if (scene_.floor) sum[i] += std::max(g.r - g.x.z, 0.0);
+      if (has_wall(scene_)) sum[i] += std::max(g.x.z + g.r - grid_.length[2], 0.0);
+    }
+    neighbours_.each_touching(
+        Host{}, scene_, grains_.data(), static_cast<dem::Index>(x.size()), r_max,
+        [&](dem::Index i, dem::Index j, double overlap) { sum[i] += overlap, sum[j] += overlap; });
+    return sum;
   }
 
   // The pressures an earlier stage has left, else that of the top.
@@ -462,8 +491,9 @@ class GridWater final : public PoreWater {
   std::vector<Vec3d> x_;
   std::vector<double> volume_;  // m3, of each grain
   std::vector<bool> top_layer_;
-  std::vector<dem::GrainRow> grains_;  // radii
-  double solids_ = 0;                  // m3
+  std::vector<dem::GrainRow> grains_;  // as of the weights
+  dem::Neighbours<Host> neighbours_;
+  double solids_ = 0;  // m3
   Faces u_, g_, before_;
   Faces push_;  // g_ for Mapping::push
   std::vector<double> div_u_;

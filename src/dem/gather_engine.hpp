@@ -227,7 +227,7 @@ class GatherEngine final : public Engine {
     for (Index c = 0; c < view_.chunks(); ++c) surroundings_->displace(c, grains.data());
     control.water = surroundings_->solve(control.drive, view_.scene.time(control.drive.step));
     std::vector<WaterRow> water(n_);
-    for (Index c = 0; c < view_.chunks(); ++c) surroundings_->push(c, water.data());
+    for (Index c = 0; c < view_.chunks(); ++c) surroundings_->push(c, grains.data(), water.data());
     water_.set(water), control_.set({control});
     refresh_view();
   }

@@ -148,14 +148,7 @@ struct Neighbours {
   // half: each pair once, in the row of its lower index. Throws Error if a coordinate is not finite.
   void build(const Space& space, const Scene& scene, const GrainRow* grains, const Role* role, Index n,
              double r_max, double margin, bool half) {
-    const CellGrid grid = make_grid(space, scene, grains, n, 2 * r_max + margin);
-    const std::int32_t cells = grid.n[0] * grid.n[1] * grid.n[2];
-    key_.resize(n), order_.resize(n), first_.resize(cells), end_.resize(cells);
-    space.for_each(n, search::Key{grid, grains, key_.data(), order_.data()});
-    space.sort_by_key(key_, order_, cells);
-    space.for_each(cells, search::Clear{first_.data(), end_.data()});
-    space.for_each(n, search::CellBounds{key_.data(), n, first_.data(), end_.data()});
-
+    const CellGrid grid = sort_into_cells(space, scene, grains, n, 2 * r_max + margin);
     count_.resize(n + 1), row.resize(n + 1);
     search::Rows rows{grid,          grains,  role,   order_.data(),      first_.data(),
                       end_.data(),   margin,  half,   scene.shear.hold_z, {chunk_size(n)},
@@ -169,7 +162,37 @@ struct Neighbours {
     space.for_each(n, rows);
   }
 
+  // Calls visit(i, j, overlap in m) for each pair that touches, once, always in the same order. Space: Host.
+  template <class Visit>
+  void each_touching(const Space& space, const Scene& scene, const GrainRow* grains, Index n, double r_max,
+                     Visit&& visit) {
+    const CellGrid grid = sort_into_cells(space, scene, grains, n, 2 * r_max);
+    const std::int32_t *order = order_.data(), *first = first_.data(), *end = end_.data();
+    for (std::int32_t k = 0; k < n; ++k) {
+      const GrainRow& a = grains[order[k]];
+      grid.around(a.x, [&](std::int32_t cell) {
+        for (std::int32_t l = std::max(first[cell], k + 1); l < end[cell]; ++l) {
+          const GrainRow& b = grains[order[l]];
+          const Vec3d d = nearest_image(grid.sides, a.x - b.x);
+          const double reach = a.r + b.r, distance2 = dot(d, d);
+          if (distance2 < reach * reach) visit(order[k], order[l], reach - std::sqrt(distance2));
+        }
+      });
+    }
+  }
+
  private:
+  CellGrid sort_into_cells(const Space& space, const Scene& scene, const GrainRow* grains, Index n,
+                           double reach) {
+    const CellGrid grid = make_grid(space, scene, grains, n, reach);
+    const std::int32_t cells = grid.n[0] * grid.n[1] * grid.n[2];
+    key_.resize(n), order_.resize(n), first_.resize(cells), end_.resize(cells);
+    space.for_each(n, search::Key{grid, grains, key_.data(), order_.data()});
+    space.sort_by_key(key_, order_, cells);
+    space.for_each(cells, search::Clear{first_.data(), end_.data()});
+    space.for_each(n, search::CellBounds{key_.data(), n, first_.data(), end_.data()});
+    return grid;
+  }
   CellGrid make_grid(const Space& space, const Scene& scene, const GrainRow* grains, Index n, double reach) {
     const std::int64_t stretch = 256, stretches = (n + stretch - 1) / stretch;
     extent_.resize(6 * stretches);

@@ -189,7 +189,7 @@ void PairEngine::exchange_alone() {
   const auto chunks = static_cast<Index>(chunks_.size());
   for (Index c = 0; c < chunks; ++c) surroundings_->displace(c, grain_.data());
   water_reaction_ = surroundings_->solve(course_.drive, scene_.time(course_.drive.step));
-  for (Index c = 0; c < chunks; ++c) surroundings_->push(c, water_.data());
+  for (Index c = 0; c < chunks; ++c) surroundings_->push(c, grain_.data(), water_.data());
 }
 
 LoadRow PairEngine::with_water(LoadRow load, Index i, std::int64_t step) const {
@@ -650,13 +650,15 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
     };
     // The thread that is last to say where its grains went solves for the pressure while others go on to
     // their pairs.
-    [[maybe_unused]] const auto exchange = [&] {
+    [[maybe_unused]] const auto exchange = [&](bool displaced) {
       if (surroundings_->stale()) {
+        displaced = false;
         if (thread == 0) surroundings_->remap(grain_.data(), drive);
         barrier.wait();
       }
-      for (const Chunk* c : mine)
-        surroundings_->displace(static_cast<Index>(c - chunks_.data()), grain_.data());
+      if (!displaced)
+        for (const Chunk* c : mine)
+          surroundings_->displace(static_cast<Index>(c - chunks_.data()), grain_.data());
       if (displaced_.fetch_add(1, std::memory_order_acq_rel) + 1 < space_.threads) return;
       displaced_.store(0, std::memory_order_relaxed);
       water_reaction_ = surroundings_->solve(drive, scene_.time(drive.step));
@@ -700,12 +702,14 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
           rebuild = true;
         }
       }
+      // By the threads that integrated them.
+      [[maybe_unused]] const bool displaced = integrated && !forces_next;
       forces_next = false;
       --left;
       integrated = left > 0 && !layer_by_stress;
       [[maybe_unused]] const bool exchanging = F.water && kicked_at(drive.step);
       if constexpr (F.water)
-        if (exchanging) exchange();
+        if (exchanging) exchange(displaced);
       const auto is_ready = [&](const Chunk& c) {
         if constexpr (F.water)
           if (exchanging && solved_.load(std::memory_order_acquire) != drive.step) return false;
@@ -715,9 +719,13 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
       const auto complete = [&](Waiting w) {
         finish<F>(*w.chunk, drive, dt, w.load);
         if constexpr (F.water)
-          if (exchanging) surroundings_->push(static_cast<Index>(w.chunk - chunks_.data()), water_.data());
+          if (exchanging)
+            surroundings_->push(static_cast<Index>(w.chunk - chunks_.data()), grain_.data(), water_.data());
         if (!integrated) return;
         integrate<F>(*w.chunk, drive, drive.step, w.load);
+        if constexpr (F.water)  // while they are in cache; the pressure of this step is solved for
+          if (kicked_at(drive.step + 1) && !surroundings_->stale())
+            surroundings_->displace(static_cast<Index>(w.chunk - chunks_.data()), grain_.data());
         buffers.give_back(w.load + w.chunk->begin);
       };
       const auto take_on = [&](Chunk& c) {

@@ -3,7 +3,8 @@
 // grains are where step n finds them:
 //
 //   remap()    only if stale(); one thread alone
-//   displace() for each chunk of grains (grain.hpp), by any thread
+//   displace() for each chunk of grains (grain.hpp), by any thread: its way since it was last pushed. May be
+//              called again, to the same end
 //   solve()    once, after all of displace(); one thread
 //   push()     for each chunk, after solve(): the force f on each of its grains, N
 //
@@ -26,7 +27,7 @@ class Surroundings {
   virtual void displace(Index chunk, const GrainRow* grains) = 0;
   // drive: at step n, wall already there. t: s, since the stage began.
   virtual WaterReaction solve(const Drive& drive, double t) = 0;
-  virtual void push(Index chunk, WaterRow* force) = 0;  // by grain, memory order
+  virtual void push(Index chunk, const GrainRow* grains, WaterRow* force) = 0;  // by grain, memory order
 };
 
 }  // namespace moraine::dem

@@ -42,7 +42,7 @@ Darcy::Darcy(const Grid& grid, const Sides& sides) : grid_(grid), sides_(sides) 
     if (!grid.periodic[a]) check_side(sides.low[a], a, false), check_side(sides.high[a], a, true);
   storage_.assign(grid.cells(), 0);
   for (int a = 0; a < 3; ++a) transmissibility_[a].assign(grid.face_count(a), 0);
-  zeros_.assign(grid.n[0], 0);
+  zeros_.assign(grid.n[0], 0), out_.resize(grid.cells());
   for (auto& row : rows_) row.assign(grid.n[0], 0);
 }
 
@@ -252,15 +252,22 @@ Exchanged Darcy::inflow(double t, const double* p) const {
   return in;
 }
 
+// p (L p - b), and what of b is no loss.
 double Darcy::dissipation(double t, const double* p) const {
+  outflow(t, p, out_.data());
   double sum = 0;
+  for (std::size_t c = 0; c < out_.size(); ++c) sum += p[c] * out_[c];
   for (int a = 0; a < 3; ++a) {
-    const auto& T = transmissibility_[a];
-    const double p_low = pressure_beyond(sides_.low[a], t), p_high = pressure_beyond(sides_.high[a], t);
-    each_face(a, [&](int, std::size_t f, std::size_t low, std::size_t high) {
-      const double drop = (low == no_cell ? p_low : p[low]) - (high == no_cell ? p_high : p[high]);
-      sum += T[f] * drop * drop;
-    });
+    if (grid_.periodic[a]) continue;
+    for (const bool high : {false, true}) {
+      const Side& side = high ? sides_.high[a] : sides_.low[a];
+      if (side.kind == Side::Kind::closed) continue;
+      const double value = side.at(t), area = grid_.face_area(a);
+      const bool flux = side.kind == Side::Kind::flux;
+      each_side_cell(a, high, [&](std::size_t c, std::size_t f) {
+        sum += flux ? p[c] * value * area : value * (transmissibility_[a][f] * (value - p[c]));
+      });
+    }
   }
   return sum;
 }

@@ -75,6 +75,7 @@ class Darcy {
   std::array<std::vector<double>, 3> transmissibility_;
   std::vector<double> zeros_;
   mutable std::array<std::vector<double>, 4> rows_;
+  mutable std::vector<double> out_;
 };
 
 }  // namespace moraine::fluid
