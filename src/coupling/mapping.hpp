@@ -67,8 +67,10 @@ class Mapping {
 
   // What U and g of each face are multiplied with, outside of these sums.
   const Faces& scale() const { return scale_; }
-  const Faces& layer() const { return layer_; }         // m2, sum of b over the grains of the top layer
-  const Faces& solid_fraction() const { return psi_; }  // 1, about each face; where there are grains, psi_min at least
+  const Faces& layer() const { return layer_; }  // m2, sum of b over the grains of the top layer
+  const Faces& solid_fraction() const {
+    return psi_;
+  }  // 1, about each face; psi_min at least where grains are
   const std::vector<double>& porosity() const { return phi_; }  // of each cell, by hats about its centre
 
  private:
