@@ -65,6 +65,14 @@ struct Pack {
   friend Mask operator<(Pack a, Pack b) { return {a.v < b.v}; }
   friend Mask operator>(Pack a, Pack b) { return {a.v > b.v}; }
   friend Pack select(Mask m, Pack a, Pack b) { return m.b ? a.v : b.v; }
+  // Bit k says what lane k does.
+  friend unsigned bits(Mask m) {
+#if defined(__AVX__)
+    return static_cast<unsigned>(_mm256_movemask_pd(reinterpret_cast<__m256d>(m.b)));
+#else
+    return (m.b[0] & 1) | (m.b[1] & 2) | (m.b[2] & 4) | (m.b[3] & 8);
+#endif
+  }
 };
 
 #if defined(__FMA__)
@@ -83,6 +91,10 @@ inline Pack round(Pack a) { return {::rint(a[0]), ::rint(a[1]), ::rint(a[2]), ::
 #endif
 inline Pack min(Pack a, Pack b) { return select(a < b, a, b); }
 inline Pack max(Pack a, Pack b) { return select(a > b, a, b); }
+inline Pack abs(Pack a) {
+  const Pack sign(-0.0);
+  return Pack::Lanes(Pack::Bits(a.v) & ~Pack::Bits(sign.v));
+}
 
 // Rows a, b, c, d become columns.
 [[gnu::always_inline]] inline void transpose(Pack& a, Pack& b, Pack& c, Pack& d) {
@@ -95,6 +107,17 @@ inline Pack max(Pack a, Pack b) { return select(a > b, a, b); }
   b = __builtin_shuffle(ab_high, cd_high, I{0, 1, 4, 5});
   c = __builtin_shuffle(ab_low, cd_low, I{2, 3, 6, 7});
   d = __builtin_shuffle(ab_high, cd_high, I{2, 3, 6, 7});
+}
+
+// The sums of all lanes of a, b and c, in the first three lanes; each as (0 + 1) + (2 + 3).
+inline Pack sums_of(Pack a, Pack b, Pack c) {
+#if defined(__AVX__)
+  const __m256d ab = _mm256_hadd_pd(a.v, b.v), c_ = _mm256_hadd_pd(c.v, _mm256_setzero_pd());
+  return _mm256_add_pd(_mm256_permute2f128_pd(ab, c_, 0x21), _mm256_blend_pd(ab, c_, 0b1100));
+#else
+  const auto sum = [](Pack p) { return (p[0] + p[1]) + (p[2] + p[3]); };
+  return {sum(a), sum(b), sum(c), 0};
+#endif
 }
 
 // A cache line of eight doubles: two rows of four.

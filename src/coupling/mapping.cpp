@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <map>
 
 #include "dem/scene.hpp"
 
@@ -11,78 +10,46 @@ namespace moraine::coupling {
 
 using dem::Vec3d;
 
-// The eight points around a grain.
-struct Mapping::Stencil {
-  std::array<Index, 8> point;
-  std::array<double, 8> w;  // hats, later weights b in m2
-  std::array<Vec3d, 8> xi;  // from the point, in cells
-};
-
 namespace {
 
 using Stencil = Mapping::Stencil;
 
-// Two neighbours on a line of points, and the hat weight of the second.
+// Two neighbours on a line of points, the hat weight of the second, and the way from the first in cells.
 struct Pair {
   int low, high;
-  double t;
+  double t, xi;
 };
 
-double wrapped(double s, int n) { return s - n * std::floor(s / n); }
-
-// Points at whole numbers: the faces along their own axis.
-Pair between_faces(double s, int n, bool periodic) {
+// Points at whole numbers, 0 to `last`; on a periodic line 0 follows.
+Pair between(double s, int last, bool periodic) {
   if (periodic) {
-    s = wrapped(s, n);
-    const int low = std::min(static_cast<int>(s), n - 1);
-    return {low, low + 1 == n ? 0 : low + 1, s - low};
+    const int n = last + 1;
+    s -= n * std::floor(s / n);
+    const int low = std::min(static_cast<int>(s), last);
+    return {low, low == last ? 0 : low + 1, s - low, s - low};
   }
-  const int low = std::clamp(static_cast<int>(std::floor(s)), 0, n - 1);
-  return {low, low + 1, std::clamp(s - low, 0.0, 1.0)};
-}
-// Points half way between: centres of cells. Beyond the last of them its weight is one.
-Pair between_cells(double s, int n, bool periodic) {
-  s -= 0.5;
-  if (periodic) {
-    s = wrapped(s, n);
-    const int low = std::min(static_cast<int>(s), n - 1);
-    return {low, low + 1 == n ? 0 : low + 1, s - low};
-  }
-  if (s <= 0) return {0, 0, 0};
-  if (s >= n - 1) return {n - 1, n - 1, 0};
-  const int low = static_cast<int>(s);
-  return {low, low + 1, s - low};
+  // Beyond the ends the last point's weight is one.
+  if (last == 0) return {0, 0, 0, s};
+  const int low = std::clamp(static_cast<int>(std::floor(s)), 0, last - 1);
+  return {low, low + 1, std::clamp(s - low, 0.0, 1.0), s - low};
 }
 
 // axis: of the faces, or -1 for cell centres.
 Stencil stencil(const fluid::Grid& g, int axis, const Vec3d& x) {
   Pair p[3];
-  double xi[3][2];
-  for (int a = 0; a < 3; ++a) {
-    const double s = x[a] / g.h(a);
-    p[a] = a == axis ? between_faces(s, g.n[a], g.periodic[a]) : between_cells(s, g.n[a], g.periodic[a]);
-    // From the nearest image of each point.
-    for (int side = 0; side < 2; ++side) {
-      double d = s - ((side ? p[a].high : p[a].low) + (a == axis ? 0.0 : 0.5));
-      if (g.periodic[a]) d -= g.n[a] * std::round(d / g.n[a]);
-      xi[a][side] = d;
-    }
-    // On one or two cells the image is not unique: tell by the weight.
-    if (g.periodic[a] && g.n[a] <= 2) xi[a][0] = p[a].t, xi[a][1] = p[a].t - 1;
-  }
+  Index stride = 1, low[3], high[3];
   Stencil out;
-  for (int k = 0; k < 8; ++k) {
-    const int side[3] = {k & 1, (k >> 1) & 1, k >> 2};
-    int at[3];
-    double w = 1;
-    for (int a = 0; a < 3; ++a) {
-      at[a] = side[a] ? p[a].high : p[a].low;
-      w *= side[a] ? p[a].t : 1 - p[a].t;
-      out.xi[k][a] = xi[a][side[a]];
-    }
-    out.w[k] = w;
-    out.point[k] =
-        static_cast<Index>(axis < 0 ? g.cell(at[0], at[1], at[2]) : g.face(axis, at[0], at[1], at[2]));
+  for (int a = 0; a < 3; ++a) {
+    const int points = a == axis ? g.faces(a) : g.n[a];
+    p[a] = between(x[a] / g.h(a) - (a == axis ? 0.0 : 0.5), points - 1, g.periodic[a]);
+    low[a] = stride * p[a].low, high[a] = stride * p[a].high;
+    stride *= points;
+    out.xi[a][0] = p[a].xi, out.xi[a][1] = p[a].xi - 1;
+  }
+  for (int e = 0; e < 8; ++e) {
+    const bool up[3] = {(e & 1) != 0, (e & 2) != 0, (e & 4) != 0};
+    out.point[e] = (up[0] ? high[0] : low[0]) + (up[1] ? high[1] : low[1]) + (up[2] ? high[2] : low[2]);
+    out.w[e] = (up[0] ? p[0].t : 1 - p[0].t) * (up[1] ? p[1].t : 1 - p[1].t) * (up[2] ? p[2].t : 1 - p[2].t);
   }
   return out;
 }
@@ -133,34 +100,6 @@ Vec3d affine_correction(const Moments& m, double psi, int skip) {
   return (fade * (steepest > 2 ? 2 / steepest : 1)) * x;
 }
 
-std::vector<Stencil> stencils_of(const fluid::Grid& grid, int axis, const std::vector<Vec3d>& x) {
-  std::vector<Stencil> out(x.size());
-  for (std::size_t i = 0; i < x.size(); ++i) out[i] = stencil(grid, axis, x[i]);
-  return out;
-}
-
-// Grains that are squeezed hardly less than those around them, and held ones.
-std::vector<bool> bearing(const fluid::Grid& grid, const std::vector<Stencil>& cells,
-                          const dem::GrainRow* grains, const std::vector<double>& squeeze) {
-  std::vector<double> solid(grid.cells(), 0), squeezed(grid.cells(), 0);  // m3, m4
-  for (std::size_t i = 0; i < cells.size(); ++i)
-    for (int k = 0; k < 8; ++k) {
-      const double v = dem::sphere_volume(grains[i].r) * cells[i].w[k];
-      solid[cells[i].point[k]] += v, squeezed[cells[i].point[k]] += v * squeeze[i];
-    }
-  std::vector<bool> bears(cells.size());
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    double around = 0;
-    for (int k = 0; k < 8; ++k) {
-      const Index c = cells[i].point[k];
-      if (solid[c] > 0) around += cells[i].w[k] * squeezed[c] / solid[c];
-    }
-    const bool held = grains[i].inverse_inertia == 0;
-    bears[i] = held || (squeeze[i] > 0 && squeeze[i] >= Mapping::loose_below * around);
-  }
-  return bears;
-}
-
 }  // namespace
 
 void Mapping::build(const fluid::Grid& grid, const std::array<bool, 3>& open_low,
@@ -174,37 +113,60 @@ void Mapping::build(const fluid::Grid& grid, const std::array<bool, 3>& open_low
     chunks_[c].begin = c * size, chunks_[c].end = std::min(n, (c + 1) * size);
   weights_.resize(n);
 
-  const std::vector<Stencil> cells = stencils_of(grid, -1, x);
-  phi_.assign(grid.cells(), 1);
-  for (Index i = 0; i < n; ++i)
-    for (int k = 0; k < 8; ++k)
-      phi_[cells[i].point[k]] -= dem::sphere_volume(grains[i].r) * cells[i].w[k] / grid.cell_volume();
-  const std::vector<bool> bears = bearing(grid, cells, grains, squeeze);
-
+  volume_.resize(n), stencils_.resize(n);
+  for (Index i = 0; i < n; ++i) volume_[i] = dem::sphere_volume(grains[i].r);
+  const auto put_stencils = [&](int axis) {
+    for (Index i = 0; i < n; ++i) stencils_[i] = stencil(grid, axis, x[i]);
+  };
+  put_stencils(-1);
+  find_bearing(grid, grains, squeeze);
   for (int axis = 0; axis < 3; ++axis) {
-    std::vector<Stencil> faces = stencils_of(grid, axis, x);
-    weigh(grid, axis, open_low[axis], open_high[axis], grains, bears, faces);
-    round(axis, faces, top_layer);
-    lay_out(axis, faces);
+    put_stencils(axis);
+    weigh(grid, axis, open_low[axis], open_high[axis]);
+    round(axis, top_layer);
+    lay_out(axis);
   }
   for (Chunk& c : chunks_) {
     c.first_octet[3] = static_cast<Index>(c.octets.size()),
     c.first_slot[3] = static_cast<Index>(c.face.size());
-    c.sum.assign(c.face.size(), 0);
+    c.sum.assign(c.face.size(), {0, 0});
   }
   start_from(x);
 }
 
-// Makes the hats of `faces` weights b; and psi_ of the axis.
-void Mapping::weigh(const fluid::Grid& grid, int axis, bool open_low, bool open_high,
-                    const dem::GrainRow* grains, const std::vector<bool>& bears,
-                    std::vector<Stencil>& faces) {
+// Which grains are held or squeezed hardly less than those around them; and the porosity. From cells'
+// stencils.
+void Mapping::find_bearing(const fluid::Grid& grid, const dem::GrainRow* grains,
+                           const std::vector<double>& squeeze) {
+  const std::size_t n = stencils_.size();
+  std::vector<double> solid(grid.cells(), 0), mean(grid.cells(), 0);  // m3; m
+  for (std::size_t i = 0; i < n; ++i)
+    for (int e = 0; e < 8; ++e) {
+      const double v = volume_[i] * stencils_[i].w[e];
+      solid[stencils_[i].point[e]] += v, mean[stencils_[i].point[e]] += v * squeeze[i];
+    }
+  phi_.resize(grid.cells());
+  for (std::size_t c = 0; c < grid.cells(); ++c) {
+    phi_[c] = 1 - solid[c] / grid.cell_volume();
+    if (solid[c] > 0) mean[c] /= solid[c];
+  }
+  bears_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    double around = 0;
+    for (int e = 0; e < 8; ++e) around += stencils_[i].w[e] * mean[stencils_[i].point[e]];
+    const bool held = grains[i].inverse_inertia == 0;
+    bears_[i] = held || (squeeze[i] > 0 && squeeze[i] >= loose_below * around);
+  }
+}
+
+// Makes the hats of the stencils weights b; and psi_ of the axis.
+void Mapping::weigh(const fluid::Grid& grid, int axis, bool open_low, bool open_high) {
+  std::vector<Stencil>& faces = stencils_;
   const std::size_t count = grid.face_count(axis), n = faces.size();
   std::vector<Moments> moments(count), loose(count);
   for (std::size_t i = 0; i < n; ++i) {
-    const double v = dem::sphere_volume(grains[i].r);
-    std::vector<Moments>& kind = bears[i] ? moments : loose;
-    for (int k = 0; k < 8; ++k) kind[faces[i].point[k]].add(v * faces[i].w[k], faces[i].xi[k]);
+    std::vector<Moments>& kind = bears_[i] ? moments : loose;
+    for (int e = 0; e < 8; ++e) kind[faces[i].point[e]].add(volume_[i] * faces[i].w[e], faces[i].from(e));
   }
   std::vector<Vec3d> slope(count, {0, 0, 0});
   std::vector<double> scale(count, 0);        // A/W; 0 at closed sides
@@ -231,13 +193,13 @@ void Mapping::weigh(const fluid::Grid& grid, int axis, bool open_low, bool open_
   for (std::size_t i = 0; i < n; ++i)
     for (int e = 0; e < 8; ++e) {
       const Index f = faces[i].point[e];
-      const double counts = bears[i] ? 1 : loose_share[f];
-      faces[i].w[e] *=
-          scale[f] * counts * dem::sphere_volume(grains[i].r) * (1 + dot(slope[f], faces[i].xi[e]));
+      const double counts = bears_[i] ? 1 : loose_share[f];
+      faces[i].w[e] *= scale[f] * counts * volume_[i] * (1 + dot(slope[f], faces[i].from(e)));
     }
 }
 
-void Mapping::round(int axis, const std::vector<Stencil>& faces, const std::vector<bool>& top_layer) {
+void Mapping::round(int axis, const std::vector<bool>& top_layer) {
+  const std::vector<Stencil>& faces = stencils_;
   constexpr double most = 32767;
   const std::size_t count = psi_[axis].size();
   std::vector<double> largest(count, 0), exact(count, 0), rounded(count, 0);  // the last two: sums
@@ -251,7 +213,7 @@ void Mapping::round(int axis, const std::vector<Stencil>& faces, const std::vect
     for (int e = 0; e < 8; ++e) {
       const Index f = faces[i].point[e];
       std::int16_t& b = weights_[i].b[axis][e];
-      b = largest[f] > 0 ? static_cast<std::int16_t>(std::lround(most * faces[i].w[e] / largest[f])) : 0;
+      b = largest[f] > 0 ? static_cast<std::int16_t>(std::lrint(most * faces[i].w[e] / largest[f])) : 0;
       rounded[f] += b;
       if (top_layer[i]) layer_[axis][f] += b;
     }
@@ -260,28 +222,34 @@ void Mapping::round(int axis, const std::vector<Stencil>& faces, const std::vect
     if (rounded[f] != 0) scale_[axis][f] = exact[f] / rounded[f];
 }
 
-void Mapping::lay_out(int axis, const std::vector<Stencil>& faces) {
-  std::vector<Index> slot_of(psi_[axis].size(), -1);
+void Mapping::lay_out(int axis) {
+  constexpr Index none = -1;
+  std::vector<Index> slot_of(psi_[axis].size(), none), octet_of = slot_of;  // by its first face
   for (Chunk& c : chunks_) {
     c.first_octet[axis] = static_cast<Index>(c.octets.size());
     c.first_slot[axis] = static_cast<Index>(c.face.size());
-    std::map<std::array<Index, 2>, std::uint16_t> octet_of;  // by the first face and the last
     for (Index i = c.begin; i < c.end; ++i) {
-      const auto& point = faces[i].point;
-      const auto [found, fresh] =
-          octet_of.try_emplace({point[0], point[7]}, static_cast<std::uint16_t>(c.octets.size()));
-      weights_[i].octet[axis] = found->second;
-      if (!fresh) continue;
-      Octet& o = c.octets.emplace_back();
-      o.face = point;
-      for (int e = 0; e < 8; ++e) {
-        Index& slot = slot_of[point[e]];
-        if (slot < 0) slot = static_cast<Index>(c.face.size()), c.face.push_back(point[e]);
-        o.slot[e] = slot;
+      const auto& point = stencils_[i].point;
+      Index& octet = octet_of[point[0]];
+      if (octet == none) {
+        octet = static_cast<Index>(c.octets.size());
+        Octet& o = c.octets.emplace_back();
+        o.face = point;
+        for (int e = 0; e < 8; e += 2) {
+          Index& slot = slot_of[point[e]];
+          if (slot == none) {
+            slot = static_cast<Index>(c.face.size());
+            c.face.push_back({point[e], point[e + 1]});
+          }
+          o.slot[e / 2] = slot;
+        }
       }
+      weights_[i].octet[axis] = static_cast<std::uint16_t>(octet);
     }
+    for (auto o = static_cast<std::size_t>(c.first_octet[axis]); o < c.octets.size(); ++o)
+      octet_of[c.octets[o].face[0]] = none;
     for (auto s = static_cast<std::size_t>(c.first_slot[axis]); s < c.face.size(); ++s)
-      slot_of[c.face[s]] = -1;
+      slot_of[c.face[s][0]] = none;
   }
 }
 
@@ -322,7 +290,7 @@ void Mapping::add_up(Index chunk, double unit, Displacement&& displacement) {
   Pack most(0.0);
   for (Index i = c.begin; i < c.end; ++i) {
     const Pack d = displacement(i);
-    most = max(max(d, -d), most);
+    most = max(abs(d), most);
     const Weights& w = weights_[i];
     for (int axis = 0; axis < 3; ++axis) {
       std::array<Pack, 2>& to = octet[w.octet[axis]];
@@ -330,10 +298,13 @@ void Mapping::add_up(Index chunk, double unit, Displacement&& displacement) {
       to[0] = fma(w.of(axis, 0), along, to[0]), to[1] = fma(w.of(axis, 1), along, to[1]);
     }
   }
-  std::fill(c.sum.begin(), c.sum.end(), 0.0);
+  std::fill(c.sum.begin(), c.sum.end(), Two{0, 0});
   for (std::size_t o = 0; o < c.octets.size(); ++o)
-    for (int e = 0; e < 8; ++e) c.sum[c.octets[o].slot[e]] += octet[o][e / 4][e % 4];
-  for (double& sum : c.sum) sum *= unit;
+    for (int e = 0; e < 8; e += 2) {
+      Two& to = c.sum[c.octets[o].slot[e / 2]];
+      to = {to[0] + octet[o][e / 4][e % 4], to[1] + octet[o][e / 4][e % 4 + 1]};
+    }
+  for (Two& sum : c.sum) sum = {unit * sum[0], unit * sum[1]};
   c.moved = unit * std::max({most[0], most[1], most[2]});
 }
 
@@ -351,7 +322,8 @@ double Mapping::collect(Faces& u) const {
   for (const Chunk& c : chunks_) {
     for (int axis = 0; axis < 3; ++axis) {
       double* const to = u[axis].data();
-      for (Index s = c.first_slot[axis]; s < c.first_slot[axis + 1]; ++s) to[c.face[s]] += c.sum[s];
+      for (Index s = c.first_slot[axis]; s < c.first_slot[axis + 1]; ++s)
+        for (int e = 0; e < 2; ++e) to[c.face[s][e]] += c.sum[s][e];
     }
     moved = std::max(moved, c.moved);
   }
@@ -374,14 +346,12 @@ void Mapping::push(Index chunk, const Faces& g, dem::WaterRow* force) const {
   }
   for (Index i = c.begin; i < c.end; ++i) {
     const Weights& w = weights_[i];
-    Pack f[4];
+    Pack f[3];
     for (int axis = 0; axis < 3; ++axis) {
       const std::array<Pack, 2>& at = octet[w.octet[axis]];
       f[axis] = fma(w.of(axis, 0), at[0], w.of(axis, 1) * at[1]);
     }
-    f[3] = Pack(0.0);
-    transpose(f[0], f[1], f[2], f[3]);
-    ((f[0] + f[1]) + (f[2] + f[3])).store(&force[i].f.x);
+    sums_of(f[0], f[1], f[2]).store(&force[i].f.x);
   }
 }
 

@@ -39,7 +39,14 @@ class Mapping {
   static constexpr double psi_min = 0.1;
   static constexpr double loose_below = 0.1;  // of the mean squeeze around it a grain is loose
 
-  struct Stencil;
+  // The eight points around a grain.
+  struct Stencil {
+    std::array<Index, 8> point;  // the first names them all
+    std::array<double, 8> w;     // hats, later weights b in m2
+    double xi[3][2];             // from the lower and the higher points of each axis, in cells
+
+    dem::Vec3d from(int e) const { return {xi[0][e & 1], xi[1][(e >> 1) & 1], xi[2][e >> 2]}; }
+  };
 
   // squeeze: m, sum of the overlaps of each grain, by which loose ones are told. open_low, open_high: whether
   // solids may be pushed at the sides along z, where water passes (others are closed).
@@ -87,26 +94,30 @@ class Mapping {
   // Eight faces that grains share.
   struct Octet {
     std::array<Index, 8> face;  // of the grid
-    std::array<Index, 8> slot;  // of the chunk's own sums
+    std::array<Index, 4> slot;  // of the chunk's own sums, for two faces each
   };
+  using Two = std::array<double, 2>;
   struct alignas(64) Chunk {
     Index begin, end;                              // grains
     std::vector<Octet> octets;                     // of all axes, one after another
     std::array<Index, 4> first_octet, first_slot;  // of each axis
-    std::vector<Index> face;                       // of each slot
-    std::vector<double> sum;
+    std::vector<std::array<Index, 2>> face;        // of each slot: neighbours along x
+    std::vector<Two> sum;
     double moved = 0;
   };
-  void weigh(const fluid::Grid& grid, int axis, bool open_low, bool open_high, const dem::GrainRow* grains,
-             const std::vector<bool>& bears, std::vector<Stencil>& faces);
-  void round(int axis, const std::vector<Stencil>& faces, const std::vector<bool>& top_layer);
-  void lay_out(int axis, const std::vector<Stencil>& faces);
+  void find_bearing(const fluid::Grid& grid, const dem::GrainRow* grains, const std::vector<double>& squeeze);
+  void weigh(const fluid::Grid& grid, int axis, bool open_low, bool open_high);
+  void round(int axis, const std::vector<bool>& top_layer);
+  void lay_out(int axis);
   template <class Displacement>
   void add_up(Index chunk, double unit, Displacement&& displacement);
 
   std::vector<Chunk> chunks_;
-  std::vector<Weights> weights_;  // memory order
-  std::vector<Pack> last_;        // m
+  std::vector<Weights> weights_;   // memory order, as the next four
+  std::vector<Stencil> stencils_;  // of cells, then of one axis after another while weights are made
+  std::vector<double> volume_;     // m3
+  std::vector<char> bears_;        // whether, or it is loose
+  std::vector<Pack> last_;         // m
   Faces layer_, psi_, scale_;
   std::vector<double> phi_;
 };

@@ -6,8 +6,8 @@
 
 #include "coupling/mapping.hpp"
 #include "dem/engine_parts.hpp"
-#include "dem/neighbours.hpp"
 #include "dem/spectrum.hpp"
+#include "dem/touching.hpp"
 #include "error.hpp"
 #include "fluid/step.hpp"
 
@@ -286,16 +286,14 @@ class GridWater final : public PoreWater {
   // m, sum of each grain's overlaps, as good as that of its normal forces.
   std::vector<double> squeeze(const std::vector<Vec3d>& x) {
     std::vector<double> sum(x.size(), 0);
-    double r_max = 0;
     for (std::size_t i = 0; i < x.size(); ++i) {
       dem::GrainRow& g = grains_[i];
-      g.x = x[i], r_max = std::max(r_max, g.r);
+      g.x = x[i];
       if (scene_.floor) sum[i] += std::max(g.r - g.x.z, 0.0);
       if (has_wall(scene_)) sum[i] += std::max(g.x.z + g.r - grid_.length[2], 0.0);
     }
-    neighbours_.each_touching(
-        Host{}, scene_, grains_.data(), static_cast<dem::Index>(x.size()), r_max,
-        [&](dem::Index i, dem::Index j, double overlap) { sum[i] += overlap, sum[j] += overlap; });
+    touching_.each(scene_, grains_.data(), static_cast<dem::Index>(x.size()),
+                   [&](dem::Index i, dem::Index j, double overlap) { sum[i] += overlap, sum[j] += overlap; });
     return sum;
   }
 
@@ -492,7 +490,7 @@ class GridWater final : public PoreWater {
   std::vector<double> volume_;  // m3, of each grain
   std::vector<bool> top_layer_;
   std::vector<dem::GrainRow> grains_;  // as of the weights
-  dem::Neighbours<Host> neighbours_;
+  dem::TouchingPairs touching_;
   double solids_ = 0;  // m3
   Faces u_, g_, before_;
   Faces push_;  // g_ for Mapping::push

@@ -33,9 +33,9 @@ struct CellGrid {
   MORAINE_HD std::int32_t index(const Vec3d& x) const {
     return (along(2, x.z) * n[1] + along(1, x.y)) * n[0] + along(0, x.x);
   }
-  // Calls visit(cell) for each distinct cell that touches the one at x.
+  // Calls visit(first, last) for runs along x of the distinct cells that touch the one at x.
   template <class Visit>
-  MORAINE_HD void around(const Vec3d& x, Visit&& visit) const {
+  MORAINE_HD void runs_around(const Vec3d& x, Visit&& visit) const {
     std::int32_t low[3], count[3];
     for (int a = 0; a < 3; ++a) {
       const std::int32_t c = along(a, x[a]);
@@ -47,10 +47,21 @@ struct CellGrid {
         count[a] = (c + 1 < n[a] ? c + 1 : n[a] - 1) - low[a] + 1;
       }
     }
+    const std::int32_t from = low[0], to = low[0] + count[0] - 1, last = n[0] - 1;
     for (std::int32_t z = 0; z < count[2]; ++z)
-      for (std::int32_t y = 0; y < count[1]; ++y)
-        for (std::int32_t k = 0; k < count[0]; ++k)
-          visit((wrap(2, low[2] + z) * n[1] + wrap(1, low[1] + y)) * n[0] + wrap(0, low[0] + k));
+      for (std::int32_t y = 0; y < count[1]; ++y) {
+        const std::int32_t row = (wrap(2, low[2] + z) * n[1] + wrap(1, low[1] + y)) * n[0];
+        if (from < 0) visit(row + last, row + last);
+        visit(row + (from < 0 ? 0 : from), row + (to > last ? last : to));
+        if (to > last) visit(row, row);
+      }
+  }
+  // Calls visit(cell) for each of them.
+  template <class Visit>
+  MORAINE_HD void around(const Vec3d& x, Visit&& visit) const {
+    runs_around(x, [&](std::int32_t first, std::int32_t last) {
+      for (std::int32_t cell = first; cell <= last; ++cell) visit(cell);
+    });
   }
   MORAINE_HD std::int32_t wrap(int axis, std::int32_t c) const {
     return c < 0 ? c + n[axis] : c >= n[axis] ? c - n[axis] : c;
@@ -148,10 +159,10 @@ struct Neighbours {
   // half: each pair once, in the row of its lower index. Throws Error if a coordinate is not finite.
   void build(const Space& space, const Scene& scene, const GrainRow* grains, const Role* role, Index n,
              double r_max, double margin, bool half) {
-    const CellGrid grid = sort_into_cells(space, scene, grains, n, 2 * r_max + margin);
+    const Cells cells = sort_into_cells(space, scene, grains, n, 2 * r_max + margin);
     count_.resize(n + 1), row.resize(n + 1);
-    search::Rows rows{grid,          grains,  role,   order_.data(),      first_.data(),
-                      end_.data(),   margin,  half,   scene.shear.hold_z, {chunk_size(n)},
+    search::Rows rows{cells.grid,    grains,  role,   cells.order,        cells.first,
+                      cells.end,     margin,  half,   scene.shear.hold_z, {chunk_size(n)},
                       count_.data(), nullptr, nullptr};
     space.write(count_.data() + n, std::int64_t{0});
     space.for_each(n, rows);
@@ -162,28 +173,14 @@ struct Neighbours {
     space.for_each(n, rows);
   }
 
-  // Calls visit(i, j, overlap in m) for each pair that touches, once, always in the same order. Space: Host.
-  template <class Visit>
-  void each_touching(const Space& space, const Scene& scene, const GrainRow* grains, Index n, double r_max,
-                     Visit&& visit) {
-    const CellGrid grid = sort_into_cells(space, scene, grains, n, 2 * r_max);
-    const std::int32_t *order = order_.data(), *first = first_.data(), *end = end_.data();
-    for (std::int32_t k = 0; k < n; ++k) {
-      const GrainRow& a = grains[order[k]];
-      grid.around(a.x, [&](std::int32_t cell) {
-        for (std::int32_t l = std::max(first[cell], k + 1); l < end[cell]; ++l) {
-          const GrainRow& b = grains[order[l]];
-          const Vec3d d = nearest_image(grid.sides, a.x - b.x);
-          const double reach = a.r + b.r, distance2 = dot(d, d);
-          if (distance2 < reach * reach) visit(order[k], order[l], reach - std::sqrt(distance2));
-        }
-      });
-    }
-  }
-
- private:
-  CellGrid sort_into_cells(const Space& space, const Scene& scene, const GrainRow* grains, Index n,
-                           double reach) {
+  // Grains `order` by cell: those of cell c are order[first[c]] to order[end[c] - 1], by index.
+  struct Cells {
+    CellGrid grid;
+    const std::int32_t *order, *first, *end;
+  };
+  // Cells at least `reach` wide; good until the next call of this or of build().
+  Cells sort_into_cells(const Space& space, const Scene& scene, const GrainRow* grains, Index n,
+                        double reach) {
     const CellGrid grid = make_grid(space, scene, grains, n, reach);
     const std::int32_t cells = grid.n[0] * grid.n[1] * grid.n[2];
     key_.resize(n), order_.resize(n), first_.resize(cells), end_.resize(cells);
@@ -191,8 +188,10 @@ struct Neighbours {
     space.sort_by_key(key_, order_, cells);
     space.for_each(cells, search::Clear{first_.data(), end_.data()});
     space.for_each(n, search::CellBounds{key_.data(), n, first_.data(), end_.data()});
-    return grid;
+    return {grid, order_.data(), first_.data(), end_.data()};
   }
+
+ private:
   CellGrid make_grid(const Space& space, const Scene& scene, const GrainRow* grains, Index n, double reach) {
     const std::int64_t stretch = 256, stretches = (n + stretch - 1) / stretch;
     extent_.resize(6 * stretches);

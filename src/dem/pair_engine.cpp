@@ -132,6 +132,8 @@ void PairEngine::load(const Scene& scene, const State& s, Surroundings* surround
   solved_ = -1;
   buffers_.clear();
   buffers_.resize(space_.threads);
+  if (features.water)
+    for (Buffers& b : buffers_) b.push.resize(chunk_size_);
 
   const std::vector<GrainRow> grains = grain_rows(scene, s);
   std::copy(grains.begin(), grains.end(), grain_.data());
@@ -551,14 +553,15 @@ void PairEngine::finish(Chunk& chunk, const Drive& drive, double dt, LoadRow* lo
 }
 
 template <Features F>
-void PairEngine::integrate(Chunk& chunk, const Drive& drive, std::int64_t step, LoadRow* loads) {
+void PairEngine::integrate(Chunk& chunk, const Drive& drive, std::int64_t step, LoadRow* loads,
+                           const WaterRow* push) {
   GrainRow* const grain = grain_.data();
   if (scene_.shear.drive == Shear::Drive::stress)
     for (const Index i : chunk.top_layer) grain[i].v.x = drive.layer_u;
   const Row zero(0.0), dt(scene_.dt, scene_.dt, scene_.dt, 0);
   const Row all_three(1, 1, 1, 0), only_z(0, 0, 1, 0), gravity(0, 0, -scene_.submerged_gravity(), 0);
   [[maybe_unused]] const Row half_dt = Row(0.5) * dt;
-  [[maybe_unused]] const Row impulse(kicked_at(step) ? static_cast<double>(scene_.exchange_interval) : 0.0);
+  [[maybe_unused]] const Row impulse(static_cast<double>(scene_.exchange_interval));
   Row sum_f = zero, group_f = zero, fastest2 = zero;
   for (Index i = chunk.begin; i < chunk.end; ++i) {
     // Other threads have read these rows; asking for several at once to write to saves most of the waiting.
@@ -568,7 +571,8 @@ void PairEngine::integrate(Chunk& chunk, const Drive& drive, std::int64_t step, 
     const Row inverse_mass = Row(g.inverse_mass) * (free ? all_three : only_z);
     const Row f = row(loads[i].f), torque = row(loads[i].torque);
     Row force = f;
-    if constexpr (F.water) force = fma(impulse, row(water_.data()[i].f), f);
+    if constexpr (F.water)
+      if (push) force = fma(impulse, row(push[i].f), f);
     const Row acceleration = fma(force, inverse_mass, free ? gravity : zero);
     const Row spin_acceleration = torque * Row(g.inverse_inertia);
     Kinematics<Row> k{row(g.x), row(g.v), row(g.omega), row(g.rotation)};
@@ -673,7 +677,8 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
           close_and_advance();
         }
         if (!integrated)
-          for (Chunk* c : mine) integrate<F>(*c, drive, step, load_.data());
+          for (Chunk* c : mine)
+            integrate<F>(*c, drive, step, load_.data(), kicked_at(step) ? water_.data() : nullptr);
         const bool guard = left == 1 || left % steps_between_checks == 0;
         if (guard)
           for (Chunk* c : mine) check(*c, drive);
@@ -715,17 +720,22 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
           if (exchanging && solved_.load(std::memory_order_acquire) != drive.step) return false;
         return others_are_done(c, drive.step);
       };
-      // Loads that are asked for after this step go to their own place, all others to a buffer.
+      // Loads that are asked for after this step go to their own place, all others to a buffer. So does the
+      // push of the water, unless the damping's ledger or a later step may ask for it.
+      [[maybe_unused]] const bool keep_push = !integrated || F.damped || scene_.exchange_interval > 1;
       const auto complete = [&](Waiting w) {
         finish<F>(*w.chunk, drive, dt, w.load);
+        WaterRow* push = nullptr;
+        const auto c = static_cast<Index>(w.chunk - chunks_.data());
         if constexpr (F.water)
-          if (exchanging)
-            surroundings_->push(static_cast<Index>(w.chunk - chunks_.data()), grain_.data(), water_.data());
+          if (exchanging) {
+            push = keep_push ? water_.data() : buffers.push.data() - w.chunk->begin;
+            surroundings_->push(c, grain_.data(), push);
+          }
         if (!integrated) return;
-        integrate<F>(*w.chunk, drive, drive.step, w.load);
+        integrate<F>(*w.chunk, drive, drive.step, w.load, push);
         if constexpr (F.water)  // while they are in cache; the pressure of this step is solved for
-          if (kicked_at(drive.step + 1) && !surroundings_->stale())
-            surroundings_->displace(static_cast<Index>(w.chunk - chunks_.data()), grain_.data());
+          if (kicked_at(drive.step + 1) && !surroundings_->stale()) surroundings_->displace(c, grain_.data());
         buffers.give_back(w.load + w.chunk->begin);
       };
       const auto take_on = [&](Chunk& c) {

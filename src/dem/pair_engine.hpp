@@ -102,6 +102,8 @@ class PairEngine final : public Engine {
   // Loads of one chunk each; all zero when taken and when given back.
   class Buffers {
    public:
+    Host::Array<WaterRow> push;  // on one chunk's grains; empty where there is no water
+
     LoadRow* take(Index rows);
     void give_back(LoadRow* buffer) { free_.push_back(buffer); }
 
@@ -153,7 +155,8 @@ class PairEngine final : public Engine {
   template <Features F>
   void finish(Chunk& chunk, const Drive& drive, double dt, LoadRow* load);
   template <Features F>
-  void integrate(Chunk& chunk, const Drive& drive, std::int64_t step, LoadRow* load);
+  // push: as load, of the water at this step; null where there is none.
+  void integrate(Chunk& chunk, const Drive& drive, std::int64_t step, LoadRow* load, const WaterRow* push);
   void check(Chunk& chunk, const Drive& drive) const;
   [[noreturn]] void report_lost() const;
 
