@@ -115,7 +115,7 @@ class GridWater final : public PoreWater {
       for (std::size_t f = 0; f < static_cast<std::size_t>(nx) * ny; ++f) out_bottom -= u_[2][f];
       now_.drained_bottom += out_bottom - in.low[2];
       now_.drained_sides -= in.low[0] + in.high[0] + in.low[1] + in.high[1];
-      const double dissipation = step_.dissipation(t, now_.p);
+      const double dissipation = step_.dissipation();
       now_.dissipated += 0.5 * dt * (now_.dissipation + dissipation);
       now_.dissipation = dissipation;
       for (int a = 0; a < 3; ++a)
@@ -163,11 +163,10 @@ class GridWater final : public PoreWater {
     for (int a = 0; a < 3; ++a) {
       std::vector<double> flow(grid_.face_count(a));
       step_.flux(a, t_, now_.p, flow);
-      for_each_cell(
-          [&](std::size_t c, std::size_t low, std::size_t high) {
-            out.flux[c][a] = 0.5 * (flow[low] + flow[high]) / grid_.face_area(a);
-          },
-          a);
+      for_each_run(a, [&](std::size_t c, std::size_t low, std::size_t high, std::size_t count) {
+        for (std::size_t i = 0; i < count; ++i)
+          out.flux[c + i][a] = 0.5 * (flow[low + i] + flow[high + i]) / grid_.face_area(a);
+      });
     }
     return out;
   }
@@ -317,26 +316,37 @@ class GridWater final : public PoreWater {
     return volume + stored;
   }
 
-  // use(cell, its low face, its high face) along an axis.
+  // use(cell, its low face, its high face, count): that many cells that follow each other, and so do their
+  // faces along the axis.
   template <class Use>
-  void for_each_cell(Use&& use, int axis) const {
-    const int nx = grid_.n[0], ny = grid_.n[1], nz = grid_.n[2];
-    for (int k = 0; k < nz; ++k)
-      for (int j = 0; j < ny; ++j)
-        for (int i = 0; i < nx; ++i) {
-          int to[3] = {i, j, k};
-          ++to[axis];
-          if (grid_.periodic[axis] && to[axis] == grid_.n[axis]) to[axis] = 0;
-          use(grid_.cell(i, j, k), grid_.face(axis, i, j, k), grid_.face(axis, to[0], to[1], to[2]));
+  void for_each_run(int axis, Use&& use) const {
+    const auto& n = grid_.n;
+    for (int k = 0; k < n[2]; ++k)
+      for (int j = 0; j < n[1]; ++j) {
+        int above[3] = {0, j, k};
+        ++above[axis];
+        const bool wraps = grid_.periodic[axis];
+        if (wraps && above[axis] == n[axis]) above[axis] = 0;
+        const std::size_t c = grid_.cell(0, j, k), low = grid_.face(axis, 0, j, k),
+                          high = grid_.face(axis, above[0], above[1], above[2]);
+        const auto count = static_cast<std::size_t>(n[0]);
+        if (axis == 0 && wraps) {
+          use(c, low, low + 1, count - 1);
+          use(c + count - 1, low + count - 1, low, std::size_t{1});
+        } else {
+          use(c, low, high, count);
         }
+      }
   }
 
   void divergence() {
     std::fill(div_u_.begin(), div_u_.end(), 0.0);
-    for (int a = 0; a < 3; ++a)
-      for_each_cell(
-          [&](std::size_t c, std::size_t low, std::size_t high) { div_u_[c] += u_[a][high] - u_[a][low]; },
-          a);
+    for (int a = 0; a < 3; ++a) {
+      const double* const u = u_[a].data();
+      for_each_run(a, [&](std::size_t c, std::size_t low, std::size_t high, std::size_t count) {
+        for (std::size_t i = 0; i < count; ++i) div_u_[c + i] += u[high + i] - u[low + i];
+      });
+    }
   }
 
   // Over dt to t; where the solver gives up, in two halves. Throws what the second attempt throws.
@@ -357,9 +367,11 @@ class GridWater final : public PoreWater {
     const std::vector<double>& p = now_.p;
     for (int a = 0; a < 3; ++a) {
       std::fill(g_[a].begin(), g_[a].end(), 0.0);
-      for_each_cell(
-          [&](std::size_t c, std::size_t low, std::size_t high) { g_[a][high] += p[c], g_[a][low] -= p[c]; },
-          a);
+      double* const g = g_[a].data();
+      for_each_run(a, [&](std::size_t c, std::size_t low, std::size_t high, std::size_t count) {
+        for (std::size_t i = 0; i < count; ++i) g[high + i] += p[c + i];
+        for (std::size_t i = 0; i < count; ++i) g[low + i] -= p[c + i];
+      });
       if (!grid_.periodic[a]) {
         const double stride = grid_.h(a) / 2;
         const auto at_side = [&](std::size_t f, std::size_t c, bool high) {

@@ -42,7 +42,7 @@ Darcy::Darcy(const Grid& grid, const Sides& sides) : grid_(grid), sides_(sides) 
     if (!grid.periodic[a]) check_side(sides.low[a], a, false), check_side(sides.high[a], a, true);
   storage_.assign(grid.cells(), 0);
   for (int a = 0; a < 3; ++a) transmissibility_[a].assign(grid.face_count(a), 0);
-  zeros_.assign(grid.n[0], 0), out_.resize(grid.cells());
+  zeros_.assign(grid.n[0], 0);
   for (auto& row : rows_) row.assign(grid.n[0], 0);
 }
 
@@ -253,10 +253,9 @@ Exchanged Darcy::inflow(double t, const double* p) const {
 }
 
 // p (L p - b), and what of b is no loss.
-double Darcy::dissipation(double t, const double* p) const {
-  outflow(t, p, out_.data());
+double Darcy::dissipation(double t, const double* p, const double* out) const {
   double sum = 0;
-  for (std::size_t c = 0; c < out_.size(); ++c) sum += p[c] * out_[c];
+  for (std::size_t c = 0; c < grid_.cells(); ++c) sum += p[c] * out[c];
   for (int a = 0; a < 3; ++a) {
     if (grid_.periodic[a]) continue;
     for (const bool high : {false, true}) {

@@ -34,7 +34,8 @@ class Darcy {
   void outflow(double t, const double* p, double* out) const;
   void flux(int axis, double t, const double* p, double* out) const;  // m3/s, upwards along the axis
   Exchanged inflow(double t, const double* p) const;                  // m3/s through the sides, into the grid
-  double dissipation(double t, const double* p) const;                // W, sum of T (drop of p)^2
+  // W, sum of T (drop of p)^2; out: of outflow(t, p).
+  double dissipation(double t, const double* p, const double* out) const;
 
   // Calls visit(axis, face, low cell, high cell); a side has no_cell there.
   static constexpr std::size_t no_cell = static_cast<std::size_t>(-1);
@@ -75,7 +76,6 @@ class Darcy {
   std::array<std::vector<double>, 3> transmissibility_;
   std::vector<double> zeros_;
   mutable std::array<std::vector<double>, 4> rows_;
-  mutable std::vector<double> out_;
 };
 
 }  // namespace moraine::fluid

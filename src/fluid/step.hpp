@@ -60,8 +60,8 @@ class PressureStep {
   const std::vector<double>& transmissibility(int axis) const;  // m3/(Pa s), of each face
   // m3/s through each face of an axis, upwards along it, at pressures p and time t.
   void flux(int axis, double t, const std::vector<double>& p, std::vector<double>& out) const;
-  // W, dissipated by the flow: sum of T (drop of p)^2, sides included.
-  double dissipation(double t, const std::vector<double>& p) const;
+  // W, dissipated by the flow at the end of the last step: sum of T (drop of p)^2, sides included.
+  double dissipation() const;
 
   struct Report {
     std::string solver;  // "pcg, jacobi" | "pcg, cholmod" | "cholmod"
