@@ -108,7 +108,7 @@ class GridWater final : public PoreWater {
       const double dt = static_cast<double>(interval_) * scene_.dt;
       double out_top = 0;
       for (std::size_t f = grid_.face(2, 0, 0, nz); f < u_[2].size(); ++f) out_top += u_[2][f];
-      const fluid::Exchanged in = advance(t, dt);
+      const fluid::Exchanged in = step_.step(t, dt, div_u_, now_.q, now_.p);
       // What grains push out through a drained wall that does not follow them is water, too.
       now_.drained_top += (out_top - scene_.area() * wall_dz) - in.high[2];
       double out_bottom = 0;
@@ -346,19 +346,6 @@ class GridWater final : public PoreWater {
       for_each_run(a, [&](std::size_t c, std::size_t low, std::size_t high, std::size_t count) {
         for (std::size_t i = 0; i < count; ++i) div_u_[c + i] += u[high + i] - u[low + i];
       });
-    }
-  }
-
-  // Over dt to t; where the solver gives up, in two halves. Throws what the second attempt throws.
-  fluid::Exchanged advance(double t, double dt) {
-    try {
-      return step_.step(t, dt, div_u_, now_.q, now_.p);
-    } catch (const Error&) {
-      for (double& u : div_u_) u *= 0.5;
-      fluid::Exchanged in = step_.step(t - 0.5 * dt, 0.5 * dt, div_u_, now_.q, now_.p);
-      const fluid::Exchanged rest = step_.step(t, 0.5 * dt, div_u_, now_.q, now_.p);
-      for (int a = 0; a < 3; ++a) in.low[a] += rest.low[a], in.high[a] += rest.high[a];
-      return in;
     }
   }
 

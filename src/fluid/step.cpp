@@ -11,12 +11,26 @@ namespace moraine::fluid {
 struct PressureStep::Impl {
   Darcy darcy;
   LinearSolver solver;
-  std::vector<double> rhs, pressure, out;
+  std::vector<double> rhs, out;
+  std::vector<double> q, pressure;  // of the step under way
   double dissipation = 0;
 
   Impl(const Grid& grid, const Sides& sides, const SolverOptions& options)
       : darcy(grid, sides), solver(darcy, options) {
-    for (auto* v : {&rhs, &pressure, &out}) v->assign(grid.cells(), 0);
+    for (auto* v : {&rhs, &out}) v->assign(grid.cells(), 0);
+  }
+
+  // share: of the step's div_u.
+  Exchanged advance(double t, double dt, double share, const std::vector<double>& div_u) {
+    const std::size_t n = rhs.size();
+    for (std::size_t c = 0; c < n; ++c) rhs[c] = q[c] - share * div_u[c];
+    darcy.add_sides(dt, t, rhs.data());
+    solver.solve(dt, rhs.data(), pressure.data());
+    darcy.outflow(t, pressure.data(), out.data());
+    for (std::size_t c = 0; c < n; ++c) q[c] = (q[c] - share * div_u[c]) - dt * out[c];
+    Exchanged volume = darcy.inflow(t, pressure.data());
+    for (int a = 0; a < 3; ++a) volume.low[a] *= dt, volume.high[a] *= dt;
+    return volume;
   }
 };
 
@@ -37,17 +51,18 @@ Exchanged PressureStep::step(double t, double dt, const std::vector<double>& div
     throw error("pore water: ", div_u.size(), " volume changes, ", q.size(), " volumes and ", p.size(),
                 " pressures; expected ", n, " of each");
   if (!(dt > 0)) throw error("pore water: a step of ", dt, " s; expected a positive one");
-  for (std::size_t c = 0; c < n; ++c) m.rhs[c] = q[c] - div_u[c];
-  m.darcy.add_sides(dt, t, m.rhs.data());
-  std::copy(p.begin(), p.end(), m.pressure.begin());
-  m.solver.solve(dt, m.rhs.data(), m.pressure.data());
-
-  p = m.pressure;
-  m.darcy.outflow(t, p.data(), m.out.data());
-  for (std::size_t c = 0; c < n; ++c) q[c] = (q[c] - div_u[c]) - dt * m.out[c];
+  m.q = q, m.pressure = p;
+  Exchanged volume;
+  try {
+    volume = m.advance(t, dt, 1, div_u);
+  } catch (const Error&) {
+    m.q = q, m.pressure = p;
+    volume = m.advance(t - 0.5 * dt, 0.5 * dt, 0.5, div_u);
+    const Exchanged rest = m.advance(t, 0.5 * dt, 0.5, div_u);
+    for (int a = 0; a < 3; ++a) volume.low[a] += rest.low[a], volume.high[a] += rest.high[a];
+  }
+  q = m.q, p = m.pressure;
   m.dissipation = m.darcy.dissipation(t, p.data(), m.out.data());
-  Exchanged volume = m.darcy.inflow(t, p.data());
-  for (int a = 0; a < 3; ++a) volume.low[a] *= dt, volume.high[a] *= dt;
   return volume;
 }
 

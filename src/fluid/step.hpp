@@ -52,7 +52,8 @@ class PressureStep {
   void set(const Grid& grid, const Medium& medium);
 
   // Advances q (cells() long) by dt to time t (of the sides' values). div_u: cells() long, m3. p: in, the
-  // guess; out, the pressure at t. Throws Error where the solver does not converge (q is then as it was).
+  // guess; out, the pressure at t. Where the solver does not converge the step is done in two halves; throws
+  // Error where that fails, too (q and p are then as they were).
   Exchanged step(double t, double dt, const std::vector<double>& div_u, std::vector<double>& q,
                  std::vector<double>& p);
 

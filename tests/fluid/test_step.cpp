@@ -226,6 +226,43 @@ TEST(Step, NoConvergenceLeavesTheStateAsItWas) {
   expect_error([&] { step.step(0, 1.0, none, q, p); }, {"right-hand side", "not finite"});
 }
 
+// As many iterations are allowed as half the step needs; it is checked that the whole one needs more.
+TEST(Step, IsHalvedWhereTheSolverGivesUp) {
+  Random random(9);
+  Grid grid{{6, 5, 7}, {0.2, 0.3, 0.5}, {true, true, false}};
+  Sides sides;
+  sides.high[2] = pressure_side(500);
+  const Medium medium = random_medium(grid, random);
+  const double dt = 1e-5;
+  std::vector<double> div_u = random_motion(grid, random, 1e-12), q(grid.cells()), p(q.size(), 0.0);
+  PressureStep halves(grid, sides, {SolverChoice::pcg, 1e-12, 500});
+  halves.set(grid, medium);
+  for (std::size_t c = 0; c < q.size(); ++c) q[c] = random(0, 1e4) * halves.storage()[c];
+  const auto q_0 = q, p_0 = p;
+
+  std::vector<double> half = div_u;
+  for (double& u : half) u *= 0.5;
+  Exchanged in = halves.step(0.5 * dt, 0.5 * dt, half, q, p);
+  std::int64_t most = halves.report().iterations;
+  const Exchanged rest = halves.step(dt, 0.5 * dt, half, q, p);
+  most = std::max(most, halves.report().iterations - most);
+  PressureStep whole(grid, sides, {SolverChoice::pcg, 1e-12, 500});
+  whole.set(grid, medium);
+  auto q_whole = q_0, p_whole = p_0;
+  whole.step(dt, dt, div_u, q_whole, p_whole);
+  ASSERT_GT(whole.report().iterations, most);
+
+  PressureStep step(grid, sides, {SolverChoice::pcg, 1e-12, static_cast<int>(most)});
+  step.set(grid, medium);
+  auto q_now = q_0, p_now = p_0;
+  const Exchanged volume = step.step(dt, dt, div_u, q_now, p_now);
+  EXPECT_EQ(q_now, q);
+  EXPECT_EQ(p_now, p);
+  EXPECT_NE(q_now, q_whole);
+  EXPECT_EQ(volume.high[2], in.high[2] + rest.high[2]);
+  EXPECT_EQ(step.dissipation(), halves.dissipation());
+}
+
 TEST(Step, RefusesAnImpossibleMedium) {
   Grid grid{{2, 3, 4}, {0.2, 0.3, 0.5}, {true, true, false}};
   PressureStep step(grid, Sides{});
