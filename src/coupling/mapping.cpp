@@ -25,7 +25,7 @@ Pair between(double s, int last, bool periodic) {
   if (periodic) {
     const int n = last + 1;
     s -= n * std::floor(s / n);
-    const int low = std::min(static_cast<int>(s), last);
+    const int low = std::clamp(static_cast<int>(s), 0, last);
     return {low, low == last ? 0 : low + 1, s - low, s - low};
   }
   // Beyond the ends the last point's weight is one.

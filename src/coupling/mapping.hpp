@@ -48,8 +48,8 @@ class Mapping {
     dem::Vec3d from(int e) const { return {xi[0][e & 1], xi[1][(e >> 1) & 1], xi[2][e >> 2]}; }
   };
 
-  // squeeze: m, sum of the overlaps of each grain, by which loose ones are told. open_low, open_high: whether
-  // solids may be pushed at the sides along z, where water passes (others are closed).
+  // squeeze: m, sum of the overlaps of each grain, by which loose ones are told. open_low, open_high: of
+  // each axis, whether water passes its sides; solids may be pushed there, too.
   void build(const fluid::Grid& grid, const std::array<bool, 3>& open_low,
              const std::array<bool, 3>& open_high, const dem::GrainRow* grains,
              const std::vector<dem::Vec3d>& x, const std::vector<double>& squeeze,

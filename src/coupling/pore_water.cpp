@@ -22,6 +22,38 @@ constexpr double most_of_limit =
     0.9;  // of the step at which grains and water would swing up: contacts come and go
 constexpr int power_iterations = 60;
 
+// Means over what each cell of a grid of `to` cells covers of one of `from`, in parts of their lengths.
+std::vector<double> on_another_grid(std::vector<double> p, const std::vector<std::int32_t>& from,
+                                    const std::array<int, 3>& to) {
+  std::array<int, 3> n{from.at(0), from.at(1), from.at(2)};
+  for (int a = 0; a < 3; ++a) {
+    const int before = n[a];
+    n[a] = to[a];
+    const int stride = a == 0   ? 1
+                       : a == 1 ? n[0]
+                                : n[0] * n[1],
+              rest = a == 2   ? 1
+                     : a == 1 ? n[2]
+                              : n[1] * n[2];
+    std::vector<double> next(static_cast<std::size_t>(stride) * n[a] * rest, 0);
+    for (int r = 0; r < rest; ++r)
+      for (int i = 0; i < n[a]; ++i)
+        for (int j = 0; j < before; ++j) {
+          // In whole numbers, so that equal grids give equal bits.
+          const std::int64_t low = std::max<std::int64_t>(std::int64_t{i} * before, std::int64_t{j} * n[a]),
+                             high = std::min<std::int64_t>((i + std::int64_t{1}) * before,
+                                                           (j + std::int64_t{1}) * n[a]);
+          if (low >= high) continue;
+          const double share = static_cast<double>(high - low) / before;
+          for (int s = 0; s < stride; ++s)
+            next[(static_cast<std::size_t>(r) * n[a] + i) * stride + s] +=
+                share * p[(static_cast<std::size_t>(r) * before + j) * stride + s];
+        }
+    p = std::move(next);
+  }
+  return p;
+}
+
 bool has_wall(const dem::Scene& s) { return s.top_wall.drive != dem::TopWall::Drive::none; }
 
 class GridWater final : public PoreWater {
@@ -94,7 +126,7 @@ class GridWater final : public PoreWater {
   dem::WaterReaction solve(const dem::Drive& drive, double t) override {
     const double moved = mapping_.collect(u_);
     const double wall_dz = has_wall(scene_) ? drive.wall_z - now_.wall_z : 0;
-    const int nx = grid_.n[0], ny = grid_.n[1], nz = grid_.n[2];
+    const int nz = grid_.n[2];
     const double column = grid_.face_area(2);
     if (closed_)
       for (std::size_t f = grid_.face(2, 0, 0, nz); f < u_[2].size(); ++f) u_[2][f] = column * wall_dz;
@@ -106,20 +138,15 @@ class GridWater final : public PoreWater {
     if (t > t_) {
       // Not t - t_, whose last bits change from step to step: a factor of the matrix belongs to one step.
       const double dt = static_cast<double>(interval_) * scene_.dt;
-      double out_top = 0;
-      for (std::size_t f = grid_.face(2, 0, 0, nz); f < u_[2].size(); ++f) out_top += u_[2][f];
       const fluid::Exchanged in = step_.step(t, dt, div_u_, now_.q, now_.p);
       // What grains push out through a drained wall that does not follow them is water, too.
-      now_.drained_top += (out_top - scene_.area() * wall_dz) - in.high[2];
-      double out_bottom = 0;
-      for (std::size_t f = 0; f < static_cast<std::size_t>(nx) * ny; ++f) out_bottom -= u_[2][f];
-      now_.drained_bottom += out_bottom - in.low[2];
-      now_.drained_sides -= in.low[0] + in.high[0] + in.low[1] + in.high[1];
+      now_.drained_top += (solids_through(2, true) - scene_.area() * wall_dz) - in.high[2];
+      now_.drained_bottom -= solids_through(2, false) + in.low[2];
+      for (int a = 0; a < 2; ++a)
+        now_.drained_sides += (solids_through(a, true) - solids_through(a, false)) - (in.low[a] + in.high[a]);
       const double dissipation = step_.dissipation();
       now_.dissipated += 0.5 * dt * (now_.dissipation + dissipation);
       now_.dissipation = dissipation;
-      for (int a = 0; a < 3; ++a)
-        now_.side_work += side_pressure(a, false, t) * in.low[a] + side_pressure(a, true, t) * in.high[a];
     }
     t_ = t;
     gradients(t);
@@ -262,6 +289,18 @@ class GridWater final : public PoreWater {
     return s.kind == fluid::Side::Kind::pressure ? s.at(t) : 0;
   }
 
+  // m3, of solids through one side, along its axis.
+  double solids_through(int axis, bool high) const {
+    if (grid_.periodic[axis]) return 0;
+    std::array<int, 3> i{}, begin{}, end = grid_.n;
+    begin[axis] = high ? grid_.n[axis] : 0, end[axis] = begin[axis] + 1;
+    double sum = 0;
+    for (i[2] = begin[2]; i[2] < end[2]; ++i[2])
+      for (i[1] = begin[1]; i[1] < end[1]; ++i[1])
+        for (i[0] = begin[0]; i[0] < end[0]; ++i[0]) sum += u_[axis][grid_.face(axis, i[0], i[1], i[2])];
+    return sum;
+  }
+
   // New weights and all that follows from where grains are.
   void map(const std::vector<Vec3d>& x) {
     std::array<bool, 3> low, high;
@@ -296,14 +335,17 @@ class GridWater final : public PoreWater {
     return sum;
   }
 
-  // The pressures an earlier stage has left, else that of the top.
+  // The water an earlier stage has left; on another grid its pressures; else the pressure of the top.
   void begin(const WaterState& before) {
     const std::vector<double>& storage = step_.storage();
-    now_.q = before.q, now_.p = before.p;
-    if (now_.q.size() != grid_.cells()) {
-      const double p = side_pressure(2, true, 0);
-      now_.q.resize(grid_.cells()), now_.p.assign(grid_.cells(), p);
-      for (std::size_t c = 0; c < grid_.cells(); ++c) now_.q[c] = storage[c] * p;
+    now_.cells.assign(grid_.n.begin(), grid_.n.end());
+    now_.q = before.q, now_.p.resize(grid_.cells());
+    if (before.q.empty() || before.cells != now_.cells) {
+      const std::vector<double> p = before.q.empty()
+                                        ? std::vector<double>(grid_.cells(), side_pressure(2, true, 0))
+                                        : on_another_grid(before.p, before.cells, grid_.n);
+      now_.q.resize(grid_.cells());
+      for (std::size_t c = 0; c < grid_.cells(); ++c) now_.q[c] = storage[c] * p[c];
     }
     for (std::size_t c = 0; c < grid_.cells(); ++c) now_.p[c] = now_.q[c] / storage[c];
     now_.volume_0 = water_volume();
@@ -422,6 +464,10 @@ class GridWater final : public PoreWater {
       double norm = 0;
       for (const double v : p) norm += v * v;
       norm = std::sqrt(norm / static_cast<double>(p.size()));
+      if (norm == 0) {  // water that no motion presses
+        lambda = last = 0;
+        break;
+      }
       for (double& v : p) v /= norm;
       now_.p = p;
       gradients(0);

@@ -1,11 +1,11 @@
 // Pore water that grains displace and that pushes them: Darcy flow on a grid (src/fluid) coupled to the
 // grains by a scheme that conserves water, momentum and energy. At an exchange, m steps after the last one:
 //
-//   U_f = A_f sum_i b_if (x_i - x_i at the last exchange)        solids through face f, m3
+//   U_f = sum_i b_if (x_i - x_i at the last exchange)            solids through face f, m3
 //   (C + Delta L) p = q - div U, q <- q - div U - Delta L p      fluid/step.hpp, Delta = m dt
-//   f_i = -sum_f b_if A_f (p_above - p_below)                    N, = -V/(1 - phi) grad p
+//   f_i = -sum_f b_if (p_above - p_below)                        N, = -V/(1 - phi) grad p
 //
-// b_if = V_i w_if / sum_j V_j w_jf: hats about the face's centre, made to reproduce affine motion
+// b_if = A_f V_i w_if / sum_j V_j w_jf: hats about the face's centre, made to reproduce affine motion
 // (mapping.hpp), so that shear of a bed of few grains makes no false divergence. Force and displacement share
 // them: the work on the grains is the work of the pressure, and momentum telescopes. Along z the grid is
 // stretched between floor and wall. An impermeable wall displaces A dH and carries p A; a drained one carries
@@ -49,10 +49,10 @@ class PoreWater : public dem::Surroundings {
 bool water_built();
 
 // `grains`: at the start of a stage (or at an exchange, after a restart). `before`: what an earlier stage or
-// a checkpoint left; empty q: the pressure of the top everywhere. restart: go on with the same bits. Throws
-// Error where the description contradicts itself, where the grid is finer than memory allows, where the
-// interval that is asked for is unstable (naming the longest that is not), and in builds without
-// MORAINE_FLUID.
+// a checkpoint left, whose pressures are carried over to another grid; empty q: the pressure of the top
+// everywhere. restart: go on with the same bits. Throws Error where the description contradicts itself, where
+// the grid is finer than memory allows, where the interval that is asked for is unstable (naming the longest
+// that is not), and in builds without MORAINE_FLUID.
 std::unique_ptr<PoreWater> make_pore_water(const Water& water, const dem::Scene& scene,
                                            const dem::State& grains, const WaterState& before, bool restart);
 

@@ -26,7 +26,6 @@ struct Water {
   bool present = false;
   double viscosity = 1.8e-3;                       // Pa s, mu_f
   double compressibility = 4.5e-10;                // 1/Pa, beta
-  double density = 1000;                           // kg/m3, rho_f
   double k_c = 0;                                  // m2, of k = k_c phi^3/(1 - phi)^2
   std::array<double, 2> porosity_range{0.1, 0.9};  // phi is kept within it for k and storage
   std::array<int, 3> cells{1, 1, 1};
@@ -41,17 +40,17 @@ struct Water {
 
 // All that must be known to go on from an exchange with the same bits, beside the grains.
 struct WaterState {
-  std::vector<double> q;          // m3, excess water stored in each cell: beta phi V p
-  std::vector<double> p;          // Pa, at the last exchange
-  std::vector<dem::Vec3d> x_map;  // m, where the grains were when the weights were made; memory order
-  double height_map = 0;          // m, of the grid then
-  double moved = 0;               // m, at most, since
-  double wall_z = 0;              // m, at the last exchange
-  double wall_pressure = 0;       // Pa, on the top wall
-  std::int64_t exchanges = 0;     // since the stage began
+  std::vector<std::int32_t> cells;  // along x, y, z
+  std::vector<double> q;            // m3, excess water stored in each cell: beta phi V p
+  std::vector<double> p;            // Pa, at the last exchange
+  std::vector<dem::Vec3d> x_map;    // m, where the grains were when the weights were made; memory order
+  double height_map = 0;            // m, of the grid then
+  double moved = 0;                 // m, at most, since
+  double wall_z = 0;                // m, at the last exchange
+  double wall_pressure = 0;         // Pa, on the top wall
+  std::int64_t exchanges = 0;       // since the stage began
   // Since the stage began.
   double drained_top = 0, drained_bottom = 0, drained_sides = 0;  // m3 of water that left
-  double side_work = 0;                                           // J, that the sides' pressures put in
   double dissipated = 0;                                          // J, by the flow
   double dissipation = 0;                                         // W, at the last exchange
   double volume_0 = 0;  // m3, of water when the stage began: sum of phi V (1 + beta p)

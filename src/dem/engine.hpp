@@ -1,4 +1,4 @@
-// What moves the grains. Two engines share one physics (contact.hpp, integrate.hpp): PairEngine for the CPU
+// What moves the grains. Two engines share one physics (contact.hpp, leapfrog.hpp): PairEngine for the CPU
 // walks pairs in SIMD packs; GatherEngine for the GPU lets each grain walk its own contacts (it also runs on
 // the host, for tests).
 #pragma once

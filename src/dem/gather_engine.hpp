@@ -101,7 +101,7 @@ class GatherEngine final : public Engine {
       now_[s.step & 1].set(now);
     }
     evaluate(control);
-    if (surroundings_) exchange(/*first=*/true);
+    if (surroundings_) exchange();
     start_half_a_step_back();
   }
 
@@ -220,10 +220,10 @@ class GatherEngine final : public Engine {
   }
 
   // Grains and water meet on the host, where the grid is solved for.
-  void exchange(bool first = false) {
+  void exchange() {
     Control control = space_.read(control_.data());
     const std::vector<GrainRow> grains = grain_[control.drive.step & 1].get();
-    if (first || surroundings_->stale()) surroundings_->remap(grains.data(), control.drive);
+    if (surroundings_->stale()) surroundings_->remap(grains.data(), control.drive);
     for (Index c = 0; c < view_.chunks(); ++c) surroundings_->displace(c, grains.data());
     control.water = surroundings_->solve(control.drive, view_.scene.time(control.drive.step));
     std::vector<WaterRow> water(n_);

@@ -77,12 +77,14 @@ struct Extent {  // smallest and largest coordinate in one stretch of grains
   MORAINE_HD void operator()(std::int64_t k) const {
     const std::int64_t end = (k + 1) * stretch < n ? (k + 1) * stretch : n;
     Vec3d low = grains[k * stretch].x, high = low;
+    double finite = dot(low, low) - dot(low, low);  // else not a number
     for (std::int64_t i = k * stretch + 1; i < end; ++i)
       for (int a = 0; a < 3; ++a) {
         low[a] = min(low[a], grains[i].x[a]);
         high[a] = max(high[a], grains[i].x[a]);
+        finite += grains[i].x[a] - grains[i].x[a];
       }
-    for (int a = 0; a < 3; ++a) out[6 * k + a] = low[a], out[6 * k + 3 + a] = high[a];
+    for (int a = 0; a < 3; ++a) out[6 * k + a] = low[a] + finite, out[6 * k + 3 + a] = high[a] + finite;
   }
 };
 
@@ -201,9 +203,12 @@ struct Neighbours {
     Vec3d length{};
     for (int a = 0; a < 3; ++a) {
       double low = e[a], high = e[3 + a];
-      for (std::int64_t k = 1; k < stretches; ++k)
+      bool finite = true;
+      for (std::int64_t k = 0; k < stretches; ++k) {
         low = std::min(low, e[6 * k + a]), high = std::max(high, e[6 * k + 3 + a]);
-      if (!std::isfinite(high - low)) throw error("a grain's ", "xyz"[a], " coordinate is not finite");
+        finite = finite && std::isfinite(e[6 * k + 3 + a] - e[6 * k + a]);
+      }
+      if (!finite) throw error("a grain's coordinates are not finite");
       const bool periodic = grid.sides.side[a] > 0;
       grid.origin[a] = periodic ? 0 : low;
       length[a] = periodic ? grid.sides.side[a] : high - low;

@@ -129,7 +129,7 @@ void PairEngine::load(const Scene& scene, const State& s, Surroundings* surround
   for (Index i = 0; i < static_cast<Index>(water_.size()); ++i)
     water_.data()[i] = {s.staggered ? s.water_force[i] : Vec3d{0, 0, 0}, 0};
   water_reaction_ = s.water;
-  solved_ = -1;
+  solved_ = -1, displaced_ = 0, failed_ = never;
   buffers_.clear();
   buffers_.resize(space_.threads);
   if (features.water)
@@ -187,7 +187,6 @@ void PairEngine::load(const Scene& scene, const State& s, Surroundings* surround
 
 // With the grains at rest in between: what the pressures of the start do.
 void PairEngine::exchange_alone() {
-  surroundings_->remap(grain_.data(), course_.drive);
   const auto chunks = static_cast<Index>(chunks_.size());
   for (Index c = 0; c < chunks; ++c) surroundings_->displace(c, grain_.data());
   water_reaction_ = surroundings_->solve(course_.drive, scene_.time(course_.drive.step));
@@ -652,21 +651,32 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
       if (!closed) drive.close(scene_, sum_reactions(drive.step), water_at(drive.step));
       drive.advance(scene_);
     };
+    // An exception that left a team of threads would end the program: kept until all have met at a barrier.
+    [[maybe_unused]] const auto keep_failure = [&](auto&& act) {
+      try {
+        act();
+      } catch (...) {
+        failure_ = std::current_exception();
+        failed_ = drive.step;
+      }
+    };
     // The thread that is last to say where its grains went solves for the pressure while others go on to
-    // their pairs.
+    // their pairs. Whether there are weights; the same for all threads.
     [[maybe_unused]] const auto exchange = [&](bool displaced) {
       if (surroundings_->stale()) {
         displaced = false;
-        if (thread == 0) surroundings_->remap(grain_.data(), drive);
+        if (thread == 0) keep_failure([&] { surroundings_->remap(grain_.data(), drive); });
         barrier.wait();
+        if (failed_ <= drive.step) return false;
       }
       if (!displaced)
         for (const Chunk* c : mine)
           surroundings_->displace(static_cast<Index>(c - chunks_.data()), grain_.data());
-      if (displaced_.fetch_add(1, std::memory_order_acq_rel) + 1 < space_.threads) return;
+      if (displaced_.fetch_add(1, std::memory_order_acq_rel) + 1 < space_.threads) return true;
       displaced_.store(0, std::memory_order_relaxed);
-      water_reaction_ = surroundings_->solve(drive, scene_.time(drive.step));
+      keep_failure([&] { water_reaction_ = surroundings_->solve(drive, scene_.time(drive.step)); });
       solved_.store(drive.step, std::memory_order_release);
+      return true;
     };
 
     while (left > 0) {
@@ -683,6 +693,7 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
         if (guard)
           for (Chunk* c : mine) check(*c, drive);
         barrier.wait();
+        if (F.water && failed_ <= step) break;
 
         if (!layer_by_stress) close_and_advance();
         if (!closed) drive.ledger.slip += sum_slip(step);
@@ -714,7 +725,7 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
       integrated = left > 0 && !layer_by_stress;
       [[maybe_unused]] const bool exchanging = F.water && kicked_at(drive.step);
       if constexpr (F.water)
-        if (exchanging) exchange(displaced);
+        if (exchanging && !exchange(displaced)) break;
       const auto is_ready = [&](const Chunk& c) {
         if constexpr (F.water)
           if (exchanging && solved_.load(std::memory_order_acquire) != drive.step) return false;
@@ -772,6 +783,7 @@ PairEngine::Pause PairEngine::run(std::int64_t& steps, bool& at_forces) {
     }
     if (thread == 0) course_ = course, closed_ = closed, steps = left, pause = reason;
   });
+  if (failed_ != never) pause = Pause::failed;
   at_forces = pause == Pause::search;
   return pause;
 }
@@ -791,6 +803,13 @@ void PairEngine::advance(std::int64_t steps) {
         break;
       case Pause::lost:
         report_lost();
+      case Pause::failed: {  // which may come of a lost grain, too
+        for (Chunk& chunk : chunks_) {
+          check(chunk, course_.drive);
+          if (chunk.lost >= 0) report_lost();
+        }
+        std::rethrow_exception(failure_);
+      }
     }
   }
 }

@@ -13,6 +13,8 @@
 #pragma once
 #include <array>
 #include <atomic>
+#include <cstdint>
+#include <exception>
 #include <memory>
 #include <vector>
 
@@ -99,11 +101,12 @@ class PairEngine final : public Engine {
     const Tally& at(std::int64_t step) const { return tally[step & 1]; }
     Tally& at(std::int64_t step) { return tally[step & 1]; }
   };
-  // Loads of one chunk each; all zero when taken and when given back.
+  // What one thread needs while a chunk is under way.
   class Buffers {
    public:
-    Host::Array<WaterRow> push;  // on one chunk's grains; empty where there is no water
+    Host::Array<WaterRow> push;  // by the water, on the grains of a chunk; empty where there is no water
 
+    // Loads of a chunk, all zero when taken and when given back.
     LoadRow* take(Index rows);
     void give_back(LoadRow* buffer) { free_.push_back(buffer); }
 
@@ -123,7 +126,7 @@ class PairEngine final : public Engine {
     double moved, moved_near, near_margin;
     std::int64_t rebuilds_near = 0;
   };
-  enum class Pause { done, search, lost };
+  enum class Pause { done, search, lost, failed };
 
   void place_contacts(const std::vector<Contact>& contacts);
   void find_candidates();
@@ -154,8 +157,8 @@ class PairEngine final : public Engine {
   void collect(const Chunk& chunk, LoadRow* load, const LoadRow* slot) const;
   template <Features F>
   void finish(Chunk& chunk, const Drive& drive, double dt, LoadRow* load);
-  template <Features F>
   // push: as load, of the water at this step; null where there is none.
+  template <Features F>
   void integrate(Chunk& chunk, const Drive& drive, std::int64_t step, LoadRow* load, const WaterRow* push);
   void check(Chunk& chunk, const Drive& drive) const;
   [[noreturn]] void report_lost() const;
@@ -183,8 +186,13 @@ class PairEngine final : public Engine {
   Host::Array<LoadRow> damping_, damping_slot_;  // the viscous part of them, where the ledger asks for it
   std::vector<Buffers> buffers_;                 // by thread
   Surroundings* surroundings_ = nullptr;
-  Host::Array<WaterRow> water_;           // with surroundings only: at the last exchange
-  WaterReaction water_reaction_;          // likewise
+  Host::Array<WaterRow> water_;   // with surroundings only: at the last exchange, for state()
+  WaterReaction water_reaction_;  // likewise
+  // What surroundings threw, and at which step: a thread may be at the next one already, and fail there,
+  // while another has not yet looked whether this one went well.
+  static constexpr std::int64_t never = INT64_MAX;
+  std::exception_ptr failure_;
+  std::atomic<std::int64_t> failed_{never};
   std::atomic<int> displaced_{0};         // threads that have, at the present exchange
   std::atomic<std::int64_t> solved_{-1};  // the last exchange whose pressures are known
   Host::Array<Role> role_;

@@ -27,7 +27,8 @@ class Surroundings {
   virtual void displace(Index chunk, const GrainRow* grains) = 0;
   // drive: at step n, wall already there. t: s, since the stage began.
   virtual WaterReaction solve(const Drive& drive, double t) = 0;
-  virtual void push(Index chunk, const GrainRow* grains, WaterRow* force) = 0;  // by grain, memory order
+  // force: by grain in memory order, though only rows of the chunk's grains need exist.
+  virtual void push(Index chunk, const GrainRow* grains, WaterRow* force) = 0;
 };
 
 }  // namespace moraine::dem

@@ -1,4 +1,4 @@
-// Vectors in three dimensions over any number type: double, or a pack of doubles (backend/pack.hpp).
+// Vectors in three dimensions over any number type: double, or a pack of doubles (backend/number.hpp).
 #pragma once
 #include "backend/number.hpp"
 

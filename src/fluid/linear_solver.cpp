@@ -194,7 +194,7 @@ struct LinearSolver::Impl {
   const std::size_t n;
   SUNContext context = nullptr;
   N_Vector b = nullptr, x = nullptr;  // b borrows the caller's array
-  SUNLinearSolver pcg = nullptr, direct = nullptr;
+  SUNLinearSolver pcg = nullptr;
   Cholmod cholmod;
   Method method = Method::pcg_jacobi;
   std::vector<double> inverse_diagonal, residual, correction;
@@ -213,7 +213,6 @@ struct LinearSolver::Impl {
     b = N_VNewEmpty_Serial(static_cast<sunindextype>(n), context);
     x = new_vector(n, context);
     pcg = SUNLinSol_PCG(x, SUN_PREC_LEFT, o.max_iterations, context);
-    direct = make_cholmod_solver(cholmod, context);
     if (!b || !pcg) throw error("pore water: no memory for the linear solver of ", n, " cells");
     SUNLinSolSetATimes(pcg, this, multiply);
     SUNLinSolSetPreconditioner(pcg, this, nullptr, precondition);
@@ -221,7 +220,6 @@ struct LinearSolver::Impl {
   }
   ~Impl() {
     SUNLinSolFree(pcg);
-    SUNLinSolFree(direct);
     N_VDestroy(x);
     N_VDestroy(b);
     SUNContext_Free(&context);
@@ -232,9 +230,8 @@ struct LinearSolver::Impl {
     m.darcy.apply(m.s, NV_DATA_S(v), NV_DATA_S(out));
     return 0;
   }
-  static int precondition(void* self, N_Vector r, N_Vector z, realtype tolerance, int) {
-    Impl& m = *static_cast<Impl*>(self);
-    if (m.method == Method::pcg_cholmod) return SUNLinSolSolve(m.direct, nullptr, z, r, tolerance);
+  static int precondition(void* self, N_Vector r, N_Vector z, realtype, int) {
+    const Impl& m = *static_cast<Impl*>(self);
     const double *from = NV_DATA_S(r), *scale = m.inverse_diagonal.data();
     double* to = NV_DATA_S(z);
     for (std::size_t i = 0; i < m.n; ++i) to[i] = from[i] * scale[i];

@@ -14,7 +14,7 @@ inline constexpr bool hdf5::all_doubles<Row> = true;
 
 namespace {
 
-constexpr std::int64_t format = 3;  // raise it with every change to a struct below
+constexpr std::int64_t format = 4;  // raise it with every change to a struct below
 
 // Every member of every stored struct, once, for writing and for reading. A new member is one more line; one
 // that is forgotten does not compile.
@@ -142,6 +142,7 @@ constexpr std::tuple members<SnapshotInfo>{
 
 template <>
 constexpr std::tuple members<coupling::WaterState>{
+    Member{"cells", &coupling::WaterState::cells},
     Member{"q", &coupling::WaterState::q},
     Member{"p", &coupling::WaterState::p},
     Member{"x_map", &coupling::WaterState::x_map},
@@ -153,7 +154,6 @@ constexpr std::tuple members<coupling::WaterState>{
     Member{"drained_top", &coupling::WaterState::drained_top},
     Member{"drained_bottom", &coupling::WaterState::drained_bottom},
     Member{"drained_sides", &coupling::WaterState::drained_sides},
-    Member{"side_work", &coupling::WaterState::side_work},
     Member{"dissipated", &coupling::WaterState::dissipated},
     Member{"dissipation", &coupling::WaterState::dissipation},
     Member{"volume_0", &coupling::WaterState::volume_0},
@@ -337,6 +337,9 @@ void validate(const std::string& file, const Checkpoint& c) {
   const coupling::WaterState& w = c.water;
   const std::size_t n = c.state.r.size();
   const auto fail = [&](const auto&... parts) { throw error(file, ": /water: ", parts...); };
+  std::size_t cells = w.cells.size() == 3 ? 1 : 0;
+  for (const std::int32_t along : w.cells) cells *= static_cast<std::size_t>(std::max(along, 0));
+  if (w.q.size() != cells) fail("q has ", w.q.size(), " rows for ", cells, " cells");
   if (w.p.size() != w.q.size()) fail("p has ", w.p.size(), " rows, q has ", w.q.size());
   if (!w.x_map.empty() && w.x_map.size() != n) fail("x_map has ", w.x_map.size(), " rows for ", n, " grains");
   if (c.scene.exchange_interval <= 0) return;

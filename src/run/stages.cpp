@@ -126,16 +126,21 @@ coupling::Water water_of(const cases::Case& c, const cases::Stage& stage, const 
   w.present = stage.fluid;
   if (!w.present) return w;
   const cases::Fluid& f = c.fluid;
-  w.viscosity = f.viscosity, w.compressibility = f.compressibility, w.density = f.density;
+  w.viscosity = f.viscosity, w.compressibility = f.compressibility;
   w.k_c = f.permeability_factor > 0 ? f.permeability_factor : diameter * diameter / 180;
   w.porosity_range = {f.porosity_min, f.porosity_max};
   w.height = f.height > 0 ? f.height : height + f.cell * diameter;
   const bool wall = scene.top_wall.drive != dem::TopWall::Drive::none;
   const double length[3] = {scene.box.x, scene.box.y, wall ? height : w.height};
   const std::int64_t wanted[3] = {f.cells_x, f.cells_y, f.cells_z};
-  for (int a = 0; a < 3; ++a)
-    w.cells[a] = static_cast<int>(
-        wanted[a] > 0 ? wanted[a] : std::max<std::int64_t>(1, std::int64_t(length[a] / (f.cell * diameter))));
+  for (int a = 0; a < 3; ++a) {
+    const double cells = wanted[a] > 0 ? static_cast<double>(wanted[a])
+                                       : std::max(1.0, std::floor(length[a] / (f.cell * diameter)));
+    if (!(cells <= 1e6))
+      throw error("pore water: ", cells, " cells along ", "xyz"[a],
+                  "; expected at most a million (fluid.cell, fluid.cells_", "xyz"[a], ")");
+    w.cells[a] = static_cast<int>(cells);
+  }
   using Kind = fluid::Side::Kind;
   w.top = coupling::TopSide(int(stage.fluid_top));
   if (w.top == coupling::TopSide::drained)
@@ -160,6 +165,11 @@ std::unique_ptr<coupling::PoreWater> fill(Stage& stage, const dem::State& grains
   if (!stage.water.present) return nullptr;
   auto water = coupling::make_pore_water(stage.water, stage.scene, grains, before, restart);
   stage.scene.exchange_interval = water->interval();
+  if (last_step(stage) < stage.scene.exchange_interval)
+    throw error("stage ", stage.name, ": lasts ", stage.duration, " s, less than the ",
+                static_cast<double>(water->interval()) * stage.scene.dt,
+                " s between two exchanges of grains and water (", water->interval(),
+                " steps); expected a longer stage, or a shorter fluid.exchange_interval");
   return water;
 }
 

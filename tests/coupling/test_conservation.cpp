@@ -21,11 +21,47 @@ TEST(ClosedBox, KeepsItsWater) {
   const double before = run.water->record(false).volume;
   for (int k = 0; k < 20; ++k) {
     run.advance(500);
-    // Sums of some hundred cells' rounding; the row of verification.md asks for 1e-10.
+    // Sums of some hundred cells' rounding; 1e-10 is asked for.
     EXPECT_NEAR(run.water->record(false).volume / before, 1, 1e-12);
     EXPECT_NEAR(run.water->record(false).balance / before, 0, 1e-12);
   }
   EXPECT_GT(run.water->state().moved + run.water->state().exchanges, 0);
+}
+
+// Grains leave through that side with the flow of the shear, water comes in where they do not fill it.
+TEST(DrainedBox, BooksWhatLeavesAtTheSides) {
+  WetBed bed = sheared();
+  bed.scene.periodic_x = false, bed.scene.dt *= 0.5;
+  Water w = water_over(bed);
+  for (auto* sides : {&w.sides.low, &w.sides.high}) (*sides)[0].kind = fluid::Side::Kind::pressure;
+  WetRun run(bed, w);
+  const double before = run.water->record(false).volume;
+  run.advance(2000);
+  EXPECT_GT(std::abs(run.water->state().drained_sides), 1e-6 * before);
+  EXPECT_NEAR(run.water->record(false).balance / before, 0, 1e-12);
+}
+
+TEST(Pressures, AreCarriedToAnotherGrid) {
+  const WetBed bed = pressed_bed();
+  Water w = water_over(bed);
+  w.top = TopSide::impermeable, w.sides = {};
+  ASSERT_EQ(w.cells, (std::array{4, 4, 2}));
+  WaterState before = under_pressure(bed, w, 5e3);
+  for (std::size_t c = 0; c < before.p.size(); ++c) before.p[c] = c < before.p.size() / 2 ? 5e3 : 2e3;
+  w.cells = {3, 4, 3};
+  const auto water = make_pore_water(w, bed.scene, bed.state, before, false);
+  const std::vector<double> p = water->fields().pressure;
+  ASSERT_EQ(p.size(), 36u);
+  for (std::size_t c = 0; c < p.size(); ++c)
+    EXPECT_NEAR(p[c], c < 12 ? 5e3 : c < 24 ? 3.5e3 : 2e3, 1e-9) << c;
+}
+
+TEST(OneCell, IsPressedByNoMotion) {
+  WetBed bed = pressed_bed();
+  bed.scene.top_wall.drive = dem::TopWall::Drive::velocity;
+  Water w = water_over(bed);
+  w.top = TopSide::impermeable, w.sides = {}, w.cells = {1, 1, 1};
+  EXPECT_EQ(make_pore_water(w, bed.scene, bed.state, {}, false)->stability().w_f, 0);
 }
 
 TEST(DrainedBox, BooksWhatLeaves) {
@@ -54,7 +90,7 @@ TEST(Momentum, OfGrainsIsTheLossOfTheWater) {
     for (std::size_t c = 0; c < f.grid.cell(0, 0, 1); ++c) floor += column * f.pressure[c];
     const double wall = area * run.water->state().wall_pressure;
     ASSERT_GT(scale, 1);
-    // Sums of some thousand roundings; the row of verification.md asks for 1e-10.
+    // Sums of some thousand roundings; 1e-10 is asked for.
     EXPECT_NEAR(sum.x / scale, 0, 1e-12);
     EXPECT_NEAR(sum.y / scale, 0, 1e-12);
     EXPECT_NEAR((sum.z + wall - floor) / scale, 0, 1e-12);

@@ -1,4 +1,4 @@
-// Grains and water against answers that are known: the rows of verification.md with grains in them.
+// Grains and water against answers that are known: consolidation, undrained loading, heave.
 #include <algorithm>
 
 #include "wet_scenes.hpp"

@@ -126,6 +126,7 @@ inline WaterState under_pressure(const WetBed& bed, const Water& w, double p) {
   const auto water = make_pore_water(w, bed.scene, bed.state, {}, false);
   const WaterFields f = water->fields();
   WaterState s;
+  s.cells.assign(f.grid.n.begin(), f.grid.n.end());
   s.p.assign(f.grid.cells(), p), s.q.resize(f.grid.cells());
   for (std::size_t c = 0; c < s.q.size(); ++c) {
     const double phi = std::clamp(f.porosity[c], w.porosity_range[0], w.porosity_range[1]);

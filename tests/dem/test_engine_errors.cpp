@@ -52,6 +52,52 @@ TEST_P(EngineErrors, Scenes) {
   expect_error(s, two(), {"top layer"});
 }
 
+// Something around the grains that fails at some exchange.
+struct Failing : Surroundings {
+  int at;
+  bool in_remap;
+  int exchanges = 0;
+  static constexpr Index grains = 600;
+
+  Failing(int exchange, bool remap) : at(exchange), in_remap(remap) {}
+  bool stale() const override { return in_remap && exchanges >= at; }
+  void remap(const GrainRow*, const Drive&) override { throw error("no remap"); }
+  void displace(Index, const GrainRow*) override {}
+  WaterReaction solve(const Drive&, double) override {
+    if (++exchanges >= at && !in_remap) throw error("no solution");
+    return {};
+  }
+  void push(Index chunk, const GrainRow*, WaterRow* force) override {
+    const Index size = chunk_size(grains);
+    std::fill(force + chunk * size, force + std::min(grains, (chunk + 1) * size), WaterRow{});
+  }
+};
+
+// Also where several threads are under way; and an engine is good for another run afterwards.
+TEST(SurroundingsThatFail, EndARunByTheirError) {
+  auto [scene, state] = cloud(Failing::grains, 0.26, 3);
+  scene.exchange_interval = 1;
+  for (const Backend backend : {Backend::cpu, Backend::reference})
+    for (const int threads : {1, 2, 4})
+      for (const bool in_remap : {false, true})
+        for (const int at : {1, 2, 7, 40}) {
+          Failing failing(at, in_remap);
+          const auto engine = make_engine(backend, threads);
+          const auto run = [&] {
+            engine->load(scene, state, &failing);
+            engine->advance(40);
+          };
+          try {
+            run();
+            ADD_FAILURE() << threads << " threads, exchange " << at;
+          } catch (const Error& e) {
+            EXPECT_STREQ(e.what(), in_remap ? "no remap" : "no solution");
+          }
+          failing = Failing(1000, false);
+          EXPECT_NO_THROW(run());
+        }
+}
+
 TEST_P(EngineErrors, NameTheLostGrainAndTheStep) {
   for (const std::int64_t steps : {1, 7, 1000}) {
     State s = two();

@@ -1,7 +1,10 @@
 // Neighbour lists against a search of all pairs.
 #include "dem/neighbours.hpp"
 
+#include <map>
 #include <random>
+
+#include "dem/touching.hpp"
 
 #include "physics/scenes.hpp"
 
@@ -51,6 +54,33 @@ void expect_all_pairs(const Case& c, std::uint64_t seed) {
     }
     EXPECT_EQ(lists.total, total);
   }
+
+  std::map<std::array<Index, 2>, double> touching, found;
+  for (Index i = 0; i < c.n; ++i)
+    for (Index j = i + 1; j < c.n; ++j) {
+      const Vec3d d = nearest_image(sides, grains[i].x - grains[j].x);
+      const double reach = grains[i].r + grains[j].r;
+      if (dot(d, d) < reach * reach) touching[{i, j}] = reach - std::sqrt(dot(d, d));
+    }
+  TouchingPairs().each(s, grains.data(), c.n, [&](Index i, Index j, double overlap) {
+    EXPECT_TRUE(found.insert({{std::min(i, j), std::max(i, j)}, overlap}).second)
+        << i << ' ' << j << " twice";
+  });
+  if (c.n >= 40) EXPECT_GT(touching.size(), 0u);
+  EXPECT_EQ(found, touching);
+}
+
+TEST(Neighbours, RefuseWhatIsNoPlace) {
+  Scene s;
+  s.box = {1, 1, 1};
+  for (const Index n : {1, 300, 2000})
+    for (const Index at : {0, n / 3, n - 1})
+      for (const double wrong : {std::nan(""), HUGE_VAL}) {
+        std::vector<GrainRow> grains(n, GrainRow{});
+        for (GrainRow& g : grains) g.x = {0.5, 0.5, 0.5}, g.r = 0.01;
+        grains[at].x.y = wrong;
+        EXPECT_THROW(TouchingPairs().each(s, grains.data(), n, [](Index, Index, double) {}), Error);
+      }
 }
 
 TEST(Neighbours, AllPairs) {
@@ -78,9 +108,9 @@ TEST(Neighbours, OneGrainFarOff) {
   Scene s;
   s.box = {0.1, 0.1, 0.1};
   std::vector<GrainRow> grains(3);
-  grains[0] = {{0.05, 0.05, 0.01}, 0.01, {}, 0.01, {}, 0};
-  grains[1] = {{0.05, 0.05, 0.029}, 0.01, {}, 0.01, {}, 0};
-  grains[2] = {{0.05, 0.05, 1e12}, 0.01, {}, 0.01, {}, 0};
+  grains[0] = {{0.05, 0.05, 0.01}, 0.01, {}, 0.01, {}, 0, {}, 0};
+  grains[1] = {{0.05, 0.05, 0.029}, 0.01, {}, 0.01, {}, 0, {}, 0};
+  grains[2] = {{0.05, 0.05, 1e12}, 0.01, {}, 0.01, {}, 0, {}, 0};
   Neighbours<Host> lists;
   lists.build(Host{}, s, grains.data(), std::vector<Role>(3, Role::free).data(), 3, 0.01, 1e-3, true);
   EXPECT_EQ(lists.total, 1);

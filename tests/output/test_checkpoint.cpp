@@ -35,6 +35,7 @@ Checkpoint sample(dem::Index grains) {
     c.state.water_force.push_back(number.vector());
     c.water.q.push_back(number()), c.water.p.push_back(number()), c.water.x_map.push_back(number.vector());
   }
+  if (grains > 0) c.water.cells = {1, 1, grains};
   c.water.exchanges = 7;
   c.water.volume_0 = number();
   for (dem::Index k = 0; k < grains; ++k) {
@@ -75,6 +76,7 @@ TEST_F(CheckpointFile, KeepsEveryBit) {
     EXPECT_EQ(read.state.role, written.state.role);
     EXPECT_EQ(read.state.step, written.state.step);
     EXPECT_EQ(read.state.water_force, written.state.water_force);
+    EXPECT_EQ(read.water.cells, written.water.cells);
     EXPECT_EQ(read.water.q, written.water.q);
     EXPECT_EQ(read.water.x_map, written.water.x_map);
     EXPECT_TRUE(std::signbit(read.height_0));
@@ -169,6 +171,8 @@ TEST_F(CheckpointFile, RefusesWhatIsNoWater) {
     EXPECT_TRUE(contains(why_not(), path.string() + ": /water: ") && contains(why_not(), part)) << why_not();
   };
   expect_refused([](Checkpoint& c) { c.water.p.pop_back(); }, "p has 2 rows, q has 3");
+  expect_refused([](Checkpoint& c) { c.water.cells[0] = 2; }, "q has 3 rows for 6 cells");
+  expect_refused([](Checkpoint& c) { c.water.cells.pop_back(); }, "q has 3 rows for 0 cells");
   expect_refused([](Checkpoint& c) { c.water.x_map.pop_back(); }, "x_map has 2 rows for 3 grains");
   expect_refused([](Checkpoint& c) { c.water.x_map.clear(); }, "x_map is empty");
   expect_refused([](Checkpoint& c) { c.water = {}; }, "meet every 4 steps");

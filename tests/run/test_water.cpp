@@ -176,6 +176,16 @@ TEST_F(Water, RefusesAnUnstableInterval) {
   EXPECT_FALSE(fs::exists(wet / "output"));
 }
 
+TEST_F(Water, RefusesTooManyCellsAndTooShortAStage) {
+  const fs::path wet = make("wet", "stages = [\"settle\"]\n" + wet_case());
+  expect_error(to_run(wet, {"stage.settle.fluid=true", "fluid.cells_x=4294967304"}),
+               {"cells along x", "at most a million", "fluid.cells_x"});
+  expect_error(to_run(wet, {"stage.settle.fluid=true", "fluid.cell=1e-9"}), {"cells along x", "fluid.cell"});
+  expect_error(to_run(wet, {"stage.settle.fluid=true", "stage.settle.duration=1e-9"}),
+               {"stage settle: lasts 1e-09 s", "between two exchanges", "longer stage"});
+  EXPECT_FALSE(fs::exists(wet / "output"));
+}
+
 TEST_F(Water, WarnsOfCellsThatMeasurePores) {
   const fs::path wet = make("wet", wet_case());
   const Outcome o = moraine({"check", wet.string(), "--threads", "1", "--set", "fluid.cells_x=5"});
