@@ -16,25 +16,26 @@ using std::string;
 
 bool is_stage_key(const Key& key) { return key.table() == "stage."; }
 
-// "0; settle, consolidate: 1e4" -> "1e4" for these kinds.
-string fallback_for(const Key& key, const string& kind) {
+struct Context {
+  const Entries* above;  // keys that a stage may take defaults from
+  string prefix;         // "cases/x/case.toml: stage.shear."
+  string kind, kind_before;
+};
+
+// "0; settle, consolidate: 1e4" -> "1e4" for these kinds; "another of its kind" comes after one of the same.
+string fallback_for(const Key& key, const Context& context) {
   const auto alternatives = split(key.fallback, "; ");
   for (std::size_t a = 1; a < alternatives.size(); ++a) {
     const auto parts = split(alternatives[a], ": ");
     const auto kinds = split(parts[0], ", ");
-    if (std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) return parts[1];
+    const bool again = parts[0] == "another of its kind" && context.kind == context.kind_before;
+    if (again || std::find(kinds.begin(), kinds.end(), context.kind) != kinds.end()) return parts[1];
   }
   return alternatives[0];
 }
 
-struct Context {
-  const Entries* above;  // keys that a stage may take defaults from
-  string prefix;         // "cases/x/case.toml: stage.shear."
-  string kind;
-};
-
 Value default_value(const Key& key, const Entries& entries, const Context& context) {
-  const string text = fallback_for(key, context.kind);
+  const string text = fallback_for(key, context);
   if (!find(text)) return parse_default(key, text);
   const auto own = entries.find(text);
   return own != entries.end() ? own->second.value : context.above->at(text).value;
@@ -229,7 +230,7 @@ Case load(const fs::path& directory, const std::vector<Override>& overrides) {
   Stage no_stage{};
   c.directory = directory;
 
-  const Context context{&draft.entries, file + ": ", ""};
+  const Context context{&draft.entries, file + ": ", "", ""};
   for (const Key& key : keys()) {
     if (is_stage_key(key)) continue;
     add_default(key, draft.entries, context);
@@ -240,9 +241,11 @@ Case load(const fs::path& directory, const std::vector<Override>& overrides) {
   c.start = start_file(directory, draft.entries.at("start"));
 
   if (draft.stages.empty()) throw error(file, ": no stages; expected at least one [[stage]]");
+  string kind_before;
   for (StageDraft& s : draft.stages) {
-    Context context{&draft.entries, s.stated + ".", ""};
+    Context context{&draft.entries, s.stated + ".", "", kind_before};
     if (s.entries.contains("stage.kind")) context.kind = std::get<string>(s.entries.at("stage.kind").value);
+    kind_before = context.kind;
     Stage& stage = c.stages.emplace_back();
     for (const Key& key : keys()) {
       if (!is_stage_key(key)) continue;

@@ -507,8 +507,8 @@ class GridWater final : public PoreWater {
     const double w = std::hypot(stability_.w_sk, stability_.w_f);
     stability_.longest_dt = most_of_limit * 2 / w;
     stability_.longest = static_cast<std::int64_t>(stability_.longest_dt / scene_.dt);
-    if (restart && water_.interval > 0) {
-      interval_ = water_.interval;
+    if (restart && scene_.exchange_interval > 0) {
+      interval_ = scene_.exchange_interval;
       return;
     }
     if (stability_.longest < 1)

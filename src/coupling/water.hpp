@@ -36,6 +36,7 @@ struct Water {
   std::int64_t interval = 0;  // steps between exchanges; 0: the longest that is stable
   Solver solver = Solver::automatic;
   double tolerance = 1e-10;
+  bool operator==(const Water&) const = default;
 };
 
 // All that must be known to go on from an exchange with the same bits, beside the grains.

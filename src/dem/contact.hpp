@@ -142,9 +142,9 @@ MORAINE_HD Grip<T> grip(const ContactParameters& p, const Geometry<T>& g, const 
   return {f_n, select(size2 > limit * limit, T(p.mu_d) * f_n / sqrt(size2), T(1))};
 }
 
-// The forces; the spring is left at what it carries.
+// The forces; the spring is left at what it carries. dt = 0: no step was taken, so what slipped still slips.
 template <Features F, class T>
-MORAINE_HD Action<T> act(const ContactParameters& p, const Geometry<T>& g, const Motion<T>& now,
+MORAINE_HD Action<T> act(const ContactParameters& p, double dt, const Geometry<T>& g, const Motion<T>& now,
                          const Vec3<T>& delta_t, const Grip<T>& grip, Spring<T>& spring) {
   const T zero(0), f_n = grip.f_n;
   const Vec3<T> none{zero, zero, zero};
@@ -179,7 +179,10 @@ MORAINE_HD Action<T> act(const ContactParameters& p, const Geometry<T>& g, const
     }
   }
   spring.delta_t = kept;
-  if constexpr (F.softening) spring.slipping = select((grip.share < T(1)) & touching, T(1), zero);
+  if constexpr (F.softening) {
+    const T slips = select((grip.share < T(1)) & touching, T(1), zero);
+    spring.slipping = dt == 0 ? max(slips, spring.slipping) : slips;
+  }
   return a;
 }
 
@@ -189,7 +192,7 @@ MORAINE_HD Action<T> contact_law(const ContactParameters& p, double dt, const Ge
                                  const Motion<T>& before, const Motion<T>& now, Spring<T>& spring) {
   Vec3<T> delta_t{};
   if constexpr (F.friction) delta_t = carry(dt, g, slide(dt, g, before), spring.delta_t);
-  return act<F>(p, g, now, delta_t, grip<F>(p, g, now, delta_t, spring.slipping), spring);
+  return act<F>(p, dt, g, now, delta_t, grip<F>(p, g, now, delta_t, spring.slipping), spring);
 }
 
 }  // namespace moraine::dem

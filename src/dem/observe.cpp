@@ -78,6 +78,16 @@ std::vector<ContactForce> contact_forces(const Scene& scene, const State& s) {
   return out;
 }
 
+void mark_slipping(const Scene& scene, State& s) {
+  constexpr double rounding = 1e-12;  // of the force that slip leaves
+  const std::vector<ContactForce> forces = contact_forces(scene, s);
+  for (std::size_t k = 0; k < forces.size(); ++k) {
+    const double limit = (1 - rounding) * scene.grain.mu_d;
+    const double f_t2 = dot(forces[k].f_t, forces[k].f_t), f_n2 = dot(forces[k].f_n, forces[k].f_n);
+    s.contacts[k].slipping = f_t2 > 0 && f_t2 >= limit * limit * f_n2 ? 1 : 0;
+  }
+}
+
 std::vector<double> grain_pressure(const Scene& scene, const State& s) {
   std::vector<double> sum(s.size(), 0);
   for (const ContactForce& c : contact_forces(scene, s)) {

@@ -43,6 +43,10 @@ struct ContactForce {
 };
 std::vector<ContactForce> contact_forces(const Scene& scene, const State& staggered);
 
+// Notes which grain contacts slip, after steps without softening, which do not tell: those whose tangential
+// force is at Coulomb's limit.
+void mark_slipping(const Scene& scene, State& staggered);
+
 // Sum of |f_n| on each grain over its surface, Pa (the pressure of Fig. 5); memory order, walls included.
 std::vector<double> grain_pressure(const Scene& scene, const State& staggered);
 

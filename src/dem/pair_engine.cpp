@@ -494,7 +494,8 @@ template <Features F, bool to_slots>
     for (int g = 0; g < block; ++g) {
       const Geometry<Pack>& at = geometry[g];
       Spring<Pack> spring{list.springs[start + g], Pack(0.0)};
-      const Action<Pack> a = act<F>(law, at, motion[g].at_step(), delta_t[g], grips[g], spring);
+      if constexpr (F.softening) spring.slipping = list.slipping[start + g];
+      const Action<Pack> a = act<F>(law, dt, at, motion[g].at_step(), delta_t[g], grips[g], spring);
       if constexpr (F.friction) list.springs[start + g] = spring.delta_t;
       if constexpr (F.softening) list.slipping[start + g] = spring.slipping;
       scatter<F, to_slots>(list.pairs[start + g], at, a.f, a.f_x_n, a.slip, load, slot_.data());

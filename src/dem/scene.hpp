@@ -21,6 +21,7 @@ struct ContactParameters {
   double gamma_t = 0;   // N s/m
   double mu_s = 0.3;    // static friction, >= mu_d
   double mu_d = 0.3;    // dynamic friction
+  bool operator==(const ContactParameters&) const = default;
 };
 
 // The horizontal wall on top of the bed.
@@ -33,6 +34,7 @@ struct TopWall {
   double frequency = 0;  // Hz
   double phase = 0;      // rad
   double velocity = 0;   // m/s, for Drive::velocity; positive upwards
+  bool operator==(const TopWall&) const = default;
 };
 
 // What moves the top layer of grains along x (par. 26). The bottom layer stands still.
@@ -42,6 +44,7 @@ struct Shear {
   double velocity = 0;  // m/s
   double stress = 0;    // Pa, on the whole cross-section
   bool hold_z = false;  // the layers also keep their height (else they move in z by their forces)
+  bool operator==(const Shear&) const = default;
 };
 
 struct Scene {
@@ -75,6 +78,7 @@ struct Scene {
     return w.sigma_0 +
            (w.amplitude != 0 ? w.amplitude * ::sin(2 * std::numbers::pi * w.frequency * t + w.phase) : 0);
   }
+  bool operator==(const Scene&) const = default;
 };
 
 MORAINE_HD double sphere_volume(double r) { return 4.0 / 3.0 * std::numbers::pi * r * r * r; }

@@ -1,6 +1,7 @@
 // The file mirrors the structs: numbers are attributes, lists are datasets, structs and lists of structs are
 // groups. Units and meanings are those of scene.hpp and state.hpp.
 #include <algorithm>
+#include <array>
 #include <tuple>
 
 #include "error.hpp"
@@ -14,7 +15,7 @@ inline constexpr bool hdf5::all_doubles<Row> = true;
 
 namespace {
 
-constexpr std::int64_t format = 4;  // raise it with every change to a struct below
+constexpr std::int64_t format = 5;  // raise it with every change to a struct below
 
 // Every member of every stored struct, once, for writing and for reading. A new member is one more line; one
 // that is forgotten does not compile.
@@ -141,6 +142,36 @@ constexpr std::tuple members<SnapshotInfo>{
 };
 
 template <>
+constexpr std::tuple members<fluid::Side>{
+    Member{"kind", &fluid::Side::kind},           Member{"value", &fluid::Side::value},
+    Member{"amplitude", &fluid::Side::amplitude}, Member{"frequency", &fluid::Side::frequency},
+    Member{"phase", &fluid::Side::phase},
+};
+
+template <>
+constexpr std::tuple members<fluid::Sides>{
+    Member{"low", &fluid::Sides::low},
+    Member{"high", &fluid::Sides::high},
+};
+
+template <>
+constexpr std::tuple members<coupling::Water>{
+    Member{"present", &coupling::Water::present},
+    Member{"viscosity", &coupling::Water::viscosity},
+    Member{"compressibility", &coupling::Water::compressibility},
+    Member{"k_c", &coupling::Water::k_c},
+    Member{"porosity_range", &coupling::Water::porosity_range},
+    Member{"cells", &coupling::Water::cells},
+    Member{"height", &coupling::Water::height},
+    Member{"sides", &coupling::Water::sides},
+    Member{"top", &coupling::Water::top},
+    Member{"closure", &coupling::Water::closure},
+    Member{"interval", &coupling::Water::interval},
+    Member{"solver", &coupling::Water::solver},
+    Member{"tolerance", &coupling::Water::tolerance},
+};
+
+template <>
 constexpr std::tuple members<coupling::WaterState>{
     Member{"cells", &coupling::WaterState::cells},
     Member{"q", &coupling::WaterState::q},
@@ -160,17 +191,29 @@ constexpr std::tuple members<coupling::WaterState>{
 };
 
 template <>
+constexpr std::tuple members<StageStart>{
+    Member{"time", &StageStart::time},
+    Member{"step", &StageStart::step},
+    Member{"clock", &StageStart::clock},
+    Member{"energy", &StageStart::energy},
+    Member{"ledger", &StageStart::ledger},
+    Member{"drained_top", &StageStart::drained_top},
+    Member{"drained_bottom", &StageStart::drained_bottom},
+    Member{"water_dissipated", &StageStart::water_dissipated},
+};
+
+template <>
 constexpr std::tuple members<Checkpoint>{
     Member{"case_text", &Checkpoint::case_text},
     Member{"version", &Checkpoint::version},
     Member{"stage", &Checkpoint::stage},
-    Member{"stage_start_time", &Checkpoint::stage_start_time},
+    Member{"start", &Checkpoint::start},
     Member{"height_0", &Checkpoint::height_0},
-    Member{"energy_0", &Checkpoint::energy_0},
     Member{"critical_step", &Checkpoint::critical_step},
     Member{"critical_at", &Checkpoint::critical_at},
     Member{"finished", &Checkpoint::finished},
     Member{"scene", &Checkpoint::scene},
+    Member{"water_settings", &Checkpoint::water_settings},
     Member{"state", &Checkpoint::state},
     Member{"water", &Checkpoint::water},
     Member{"rows", &Checkpoint::rows},
@@ -188,11 +231,23 @@ template <>
 constexpr auto last<dem::Role> = dem::Role::top;
 template <>
 constexpr auto last<dem::WallName> = dem::WallName::top;
+template <>
+constexpr auto last<fluid::Side::Kind> = fluid::Side::Kind::flux;
+template <>
+constexpr auto last<coupling::TopSide> = coupling::TopSide::impermeable;
+template <>
+constexpr auto last<coupling::Closure> = coupling::Closure::pressure_gradient;
+template <>
+constexpr auto last<coupling::Solver> = coupling::Solver::cholmod;
 
 template <class T>
 constexpr bool is_list = false;
 template <class T>
 constexpr bool is_list<std::vector<T>> = true;
+template <class T>
+constexpr bool is_array = false;
+template <class T, std::size_t n>
+constexpr bool is_array<std::array<T, n>> = true;
 
 // Counts the members of an aggregate by how many initialisers it takes.
 struct Anything {
@@ -239,6 +294,8 @@ template <class T>
 void put(const hdf5::Group& group, const char* name, const T& value) {
   if constexpr (is_list<T>) {
     put_list(group, name, value);
+  } else if constexpr (is_array<T>) {
+    put_list(group, name, std::vector(value.begin(), value.end()));
   } else if constexpr (is_stored_struct<T>) {
     const hdf5::Group inner = group.create_group(name);
     for_each_member<T>([&](const char* member, auto pointer) { put(inner, member, value.*pointer); });
@@ -282,6 +339,12 @@ template <class T>
 void get(const hdf5::Group& group, const char* name, T& value) {
   if constexpr (is_list<T>) {
     get_list(group, name, value);
+  } else if constexpr (is_array<T>) {
+    std::vector<typename T::value_type> list;
+    get_list(group, name, list);
+    if (list.size() != value.size())
+      throw error(group.where(name), ": ", list.size(), " values, ", value.size(), " expected");
+    std::ranges::copy(list, value.begin());
   } else if constexpr (is_stored_struct<T>) {
     const hdf5::Group inner = group.open_group(name);
     for_each_member<T>([&](const char* member, auto pointer) { get(inner, member, value.*pointer); });

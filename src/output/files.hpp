@@ -29,12 +29,12 @@ struct Row {
   double step;                // steps since the stage began
   double time;                // s, since the case began
   double stage_time;          // s, since the stage began
-  double shear_strain;        // 1
+  double shear_strain;        // 1, displacement of the top layer since shear began, over H_0
   double shear_stress;        // Pa
   double normal_stress;       // Pa
   double shear_friction;      // 1
   double height;              // m
-  double dilation;            // m
+  double dilation;            // m, height - H_0
   double dilation_diameters;  // mean grain diameters
   double porosity;            // 1
   double mean_overlap;        // m
@@ -90,19 +90,30 @@ SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::s
 // bed.xdmf, grains and grid together. Rewritten whole.
 void write_xdmf(const std::filesystem::path& directory, const std::vector<SnapshotInfo>& snapshots);
 
+// What a stage began with: the rows of the series count from here.
+struct StageStart {
+  double time = 0;        // s, since the case began
+  std::int64_t step = 0;  // of the scene's clock; not 0 where the stage goes on as the one before
+  double clock = 0;       // s, Scene::time(step)
+  double energy = 0;      // J
+  dem::Ledger ledger;
+  double drained_top = 0, drained_bottom = 0;  // m3
+  double water_dissipated = 0;                 // J
+};
+
 // checkpoint.h5: all that is needed to go on with the same bits, the series so far included.
 struct Checkpoint {
   std::string case_text;  // resolved case
   std::string version;
-  std::int64_t stage = 0;       // index; == number of stages when the case has finished
-  double stage_start_time = 0;  // s, since the case began
-  double height_0 = 0;          // m, when the stage began
-  double energy_0 = 0;          // J, when the stage began
-  // With dt = "auto": the critical step of the contact network, s, and the step of the stage it was found at.
+  std::int64_t stage = 0;  // index; == number of stages when the case has finished
+  StageStart start;        // of the stage
+  double height_0 = 0;     // m, H_0: of the bed when the stage, or the shear that it carries on, began
+  // With dt = "auto": the critical step of the contact network, s, and the step of the clock it was found at.
   double critical_step = 0;
   std::int64_t critical_at = 0;
   bool finished = false;
-  dem::Scene scene;  // of the stage
+  dem::Scene scene;                // of the stage; dt = 0: none yet
+  coupling::Water water_settings;  // of the stage, as its case asks for
   dem::State state;
   coupling::WaterState water;
   std::vector<Row> rows;

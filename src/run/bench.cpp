@@ -16,11 +16,11 @@ void bench_case(const Options& options, const std::string& stage_name, std::int6
     if (index == c.stages.size()) throw error("--stage ", stage_name, ": the case has no such stage");
   }
   const Start start = start_of(c);
-  dem::State state = start.state;
-  Stage stage = prepare(c, index, start, state);
-  const auto water = fill(stage, state, start.water, false);
+  output::Checkpoint now = start.before;
+  Stage stage = prepare(c, index, start, now);
+  const auto water = fill(stage, now.state, now.water, stage.goes_on);
   const auto engine = dem::make_engine(options.backend, options.threads);
-  engine->load(stage.scene, state, water.get());
+  engine->load(stage.scene, now.state, water.get());
   steps = at_exchange(stage, steps);
   engine->advance(at_exchange(stage, std::min<std::int64_t>(100, steps)));  // warm caches and lists
   const auto began = std::chrono::steady_clock::now();

@@ -81,7 +81,7 @@ void check_case(const Options& options) {
   const Start start = start_of(c);
   const auto engine = dem::make_engine(options.backend, options.threads);
   const std::vector<std::string> warnings = precheck(c, start, *engine);
-  dem::State state = start.state;
+  const dem::State& state = start.before.state;
   const double n = state.size(), diameter = mean_diameter(state);
   double volume = 0;
   for (const double r : state.r) volume += dem::sphere_volume(r);
@@ -106,13 +106,14 @@ void check_case(const Options& options) {
   double total = 0, ms = 0;
   for (std::size_t k = 0; k < c.stages.size(); ++k) {
     const cases::Stage& wanted = c.stages[k];
-    dem::State s = start.state;
-    Stage stage = prepare(c, k, start, s);
+    output::Checkpoint now = start.before;
+    Stage stage = prepare(c, k, start, now);
+    const dem::State& s = now.state;
     const dem::Scene& scene = stage.scene;
     if (k == 0) {
       dem::Scene timed = scene;  // with a step that the bed survives: how long one takes is the same
       timed.dt = std::min(scene.dt, 0.5 * critical_step(scene, s));
-      auto timed_water = fill(stage, s, start.water, false);
+      auto timed_water = fill(stage, s, now.water, stage.goes_on);
       timed.exchange_interval = stage.scene.exchange_interval;
       ms = time_a_step(*engine, timed, s, timed_water.get());
       std::printf("  backend       %s\n", engine->describe().c_str());
@@ -147,7 +148,7 @@ void check_case(const Options& options) {
                     inertia > 1e-3 ? "  (above 1e-3: not pseudo-static)" : "");
       }
     }
-    if (const auto water = fill(stage, s, start.water, false))
+    if (const auto water = fill(stage, s, now.water, stage.goes_on))
       print_water(c, stage, s, *water, wanted.kind == cases::Stage::Kind::settle ? settled : stage.height_0,
                   strain_rate);
     std::printf("    time        about %s at %.3g ms a step\n", readable_time(steps * ms / 1e3).c_str(), ms);

@@ -22,7 +22,8 @@ std::string triple(const dem::Vec3d& a) {
 
 std::string when(const Stage& stage, const dem::State& s) {
   std::ostringstream text;
-  text << " at step " << s.step << " (t = " << stage.scene.time(s.step) << " s) of stage " << stage.name;
+  text << " at step " << s.step - stage.first_step << " (t = " << stage.time(s.step) << " s) of stage "
+       << stage.name;
   return text.str();
 }
 
@@ -94,8 +95,9 @@ std::string describe(const Overlap& o, const dem::State& s) {
   return text.str();
 }
 
-Guard::Guard(const cases::Guards& limits, const Stage& stage, const std::vector<output::Row>& rows)
-    : limits_(limits), stage_(stage) {
+Guard::Guard(const cases::Guards& limits, const Stage& stage, const std::vector<output::Row>& rows,
+             const output::StageStart& start)
+    : limits_(limits), stage_(stage), start_(start) {
   const auto own = std::find_if(rows.begin(), rows.end(),
                                 [&](const output::Row& r) { return r.stage == rows.back().stage; });
   first_ = *own;
@@ -123,13 +125,12 @@ bool Guard::finds_healthy(const dem::State& s) const {
 }
 
 void Guard::check_energy(const dem::State& s) {
-  const double energy_0 = stored(first_) + first_.potential;
-  const output::Row now = row_of(static_cast<std::size_t>(first_.stage), stage_, s, 0, energy_0);
+  const output::Row now = row_of(static_cast<std::size_t>(first_.stage), stage_, s, start_);
   most_put_in_ = std::max(most_put_in_, energy_put_in({first_, now}));
   // Rounding of the potential energy may exceed what a bed at rest has stored.
   const double had = stored(first_) + most_put_in_ + 1e-10 * std::abs(first_.potential);
   const double gained =
-      stored(now) + now.potential - energy_0 - now.top_wall_work - now.layers_work - now.water_work;
+      stored(now) + now.potential - start_.energy - now.top_wall_work - now.layers_work - now.water_work;
   const bool ledger = stage_.scene.ledger;
   // Damping that pushes is creation of energy too, though the ledger balances.
   const double negative = ledger ? std::max(0.0, -now.viscous) + std::max(0.0, -now.slip) : 0;

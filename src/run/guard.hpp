@@ -22,7 +22,8 @@ namespace moraine::run {
 class Guard {
  public:
   // `rows`: the series so far, with at least the first row of this stage.
-  Guard(const cases::Guards& limits, const Stage& stage, const std::vector<output::Row>& rows);
+  Guard(const cases::Guards& limits, const Stage& stage, const std::vector<output::Row>& rows,
+        const output::StageStart& start);
 
   std::int64_t every() const { return limits_.interval; }  // steps
   void check(const dem::State& state);                     // throws Error
@@ -33,8 +34,9 @@ class Guard {
   void check_energy(const dem::State& state);
 
   cases::Guards limits_;
-  const Stage& stage_;      // whose step may change meanwhile
-  output::Row first_;       // of the stage
+  const Stage& stage_;  // whose step may change meanwhile
+  output::Row first_;   // of the stage
+  output::StageStart start_;
   double most_put_in_ = 0;  // J
 };
 

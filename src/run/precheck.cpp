@@ -119,14 +119,21 @@ void check_overlaps(const cases::Case& c, const dem::Scene& scene, const dem::St
 std::vector<std::string> precheck(const cases::Case& c, const Start& start, dem::Engine& engine) {
   std::vector<std::string> warnings;
   for (std::size_t k = 0; k < c.stages.size(); ++k) {
-    dem::State s = start.state;
-    Stage stage = prepare(c, k, start, s);
+    output::Checkpoint now = start.before;
+    Stage stage = prepare(c, k, start, now);
+    const dem::State& s = now.state;
+    const bool bed = k == 0 || !c.start.empty();  // or loose grains that will be one
+    if (bed) warnings.insert(warnings.end(), stage.warnings.begin(), stage.warnings.end());
+    if (!bed && shears(stage.kind) && !(k > 0 && shears(c.stages[k - 1].kind))) {
+      const auto foreseen = foresee_layers(c.stages[k], s, stage.scene.area());
+      warnings.insert(warnings.end(), foreseen.begin(), foreseen.end());
+    }
     check_step(stage, s, warnings);
     check_margin(stage, s, warnings);
     check_cells(stage, warnings);
     // Refuses what is impossible; a later stage of loose grains is judged when it comes, with its bed.
     std::unique_ptr<coupling::PoreWater> water;
-    if (k == 0 || !c.start.empty() || !coupling::water_built()) water = fill(stage, s, start.water, false);
+    if (bed || !coupling::water_built()) water = fill(stage, s, now.water, stage.goes_on);
     if (k > 0) continue;
     engine.load(stage.scene, s, water.get());
     check_overlaps(c, stage.scene, engine.state());

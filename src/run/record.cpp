@@ -15,10 +15,6 @@ double layer_displacement(const dem::State& s) {
   return 0;
 }
 
-bool shears(cases::Stage::Kind k) {
-  return k == cases::Stage::Kind::shear || k == cases::Stage::Kind::shear_stress;
-}
-
 std::vector<output::Row> rows_of_stage(std::size_t stage, const std::vector<output::Row>& rows) {
   std::vector<output::Row> own;
   for (const output::Row& r : rows)
@@ -28,16 +24,16 @@ std::vector<output::Row> rows_of_stage(std::size_t stage, const std::vector<outp
 
 }  // namespace
 
-output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, double time_0,
-                   double energy_0) {
+output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s,
+                   const output::StageStart& start) {
   const dem::Observation o = dem::observe(stage.scene, s);
   const dem::Energy& e = o.energy;
-  const dem::Ledger& l = s.ledger;
+  const dem::Ledger &l = s.ledger, &l_0 = start.ledger;
   output::Row row{};
   row.stage = static_cast<double>(index);
-  row.step = static_cast<double>(s.step);
-  row.stage_time = stage.scene.time(s.step);
-  row.time = time_0 + row.stage_time;
+  row.step = static_cast<double>(s.step - start.step);
+  row.stage_time = stage.scene.time(s.step) - start.clock;
+  row.time = start.time + row.stage_time;
   row.shear_strain = shears(stage.kind) ? layer_displacement(s) / stage.height_0 : 0;
   row.shear_stress = o.shear_stress;
   row.normal_stress = o.normal_stress;
@@ -52,41 +48,61 @@ output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, d
   row.kinetic = e.kinetic, row.rotational = e.rotational;
   row.elastic_normal = e.elastic_normal, row.elastic_tangential = e.elastic_tangential;
   row.potential = e.potential, row.wall_kinetic = e.wall_kinetic;
-  row.water_work = l.water;
-  row.slip = l.slip, row.viscous = l.viscous, row.top_wall_work = l.top_wall, row.layers_work = l.layers;
-  row.residue = stage.scene.ledger
-                    ? (e.total() - energy_0) + l.slip + l.viscous - l.top_wall - l.layers - l.water
-                    : std::numeric_limits<double>::quiet_NaN();
+  row.water_work = l.water - l_0.water;
+  row.slip = l.slip - l_0.slip, row.viscous = l.viscous - l_0.viscous;
+  row.top_wall_work = l.top_wall - l_0.top_wall, row.layers_work = l.layers - l_0.layers;
+  row.residue = stage.scene.ledger ? (e.total() - start.energy) + row.slip + row.viscous - row.top_wall_work -
+                                         row.layers_work - row.water_work
+                                   : std::numeric_limits<double>::quiet_NaN();
   return row;
 }
 
-void add_water(output::Row& row, const Stage& stage, const coupling::PoreWater& water) {
+void add_water(output::Row& row, const Stage& stage, const coupling::PoreWater& water,
+               const output::StageStart& start) {
   const coupling::WaterRecord r = water.record(/*upper_half=*/shears(stage.kind));
   const coupling::WaterState s = water.state();
   row.wall_water_pressure = s.wall_pressure;
   const double total = row.normal_stress + s.wall_pressure;
   row.total_friction = total > 0 ? row.shear_stress / total : 0;
   row.water_pressure_mean = r.mean, row.water_pressure_min = r.least, row.water_pressure_max = r.most;
-  row.water_drained_top = s.drained_top, row.water_drained_bottom = s.drained_bottom;
+  row.water_drained_top = s.drained_top - start.drained_top;
+  row.water_drained_bottom = s.drained_bottom - start.drained_bottom;
   row.water_volume = r.volume, row.water_balance = r.balance;
-  row.water_stored = r.stored, row.water_dissipated = s.dissipated;
+  row.water_stored = r.stored, row.water_dissipated = s.dissipated - start.water_dissipated;
+}
+
+double direction_of_shear(const std::vector<output::Row>& rows) {
+  const double first = rows.front().shear_strain;
+  double excursion = rows.back().shear_strain - first;
+  if (excursion == 0)
+    for (const output::Row& r : rows)
+      if (std::abs(r.shear_strain - first) > std::abs(excursion)) excursion = r.shear_strain - first;
+  return excursion < 0 ? -1 : 1;
 }
 
 Strength strength_of(const std::vector<output::Row>& rows) {
-  Strength s{0, 0, 0, 0, rows.back().dilation_diameters};
+  const double along = direction_of_shear(rows);
+  struct Point {
+    double strain, friction;
+  };
+  std::vector<Point> curve;
   for (const output::Row& r : rows)
-    if (r.shear_strain > 0 && r.shear_friction > s.peak)
-      s.peak = r.shear_friction, s.peak_strain = r.shear_strain;
-  const double last = rows.back().shear_strain;
+    curve.push_back({along * (r.shear_strain - rows.front().shear_strain), along * r.shear_friction});
+
+  constexpr double none = -std::numeric_limits<double>::infinity();
+  Strength s{none, 0, none, 0, rows.back().dilation_diameters};
+  const double last = curve.back().strain;
   std::size_t count = 0;
-  for (const output::Row& r : rows) {
-    if (r.shear_strain >= 2.0 / 3.0 * last) s.ultimate += r.shear_friction, ++count;
+  for (const Point& p : curve) {
+    if (p.strain > 0 && p.friction > s.peak) s.peak = p.friction, s.peak_strain = p.strain;
+    if (p.strain >= 2.0 / 3.0 * last) s.ultimate += p.friction, ++count;
     double sum = 0;
     int n = 0;
-    for (const output::Row& q : rows)
-      if (std::abs(q.shear_strain - r.shear_strain) <= 0.01) sum += q.shear_friction, ++n;
-    if (r.shear_strain >= 0.01 || last < 0.02) s.smoothed_peak = std::max(s.smoothed_peak, sum / n);
+    for (const Point& q : curve)
+      if (std::abs(q.strain - p.strain) <= 0.01) sum += q.friction, ++n;
+    if (p.strain >= 0.01 || last < 0.02) s.smoothed_peak = std::max(s.smoothed_peak, sum / n);
   }
+  if (s.peak == none) s.peak = 0;  // a layer that has not moved yet
   s.ultimate /= static_cast<double>(count);
   return s;
 }
@@ -134,9 +150,10 @@ std::string summary(const std::vector<cases::Stage>& stages, const std::vector<o
                 all_in > 0 ? std::abs(all_residue) / all_in : 0.0);
   out += text;
   return out +
-         "peak: largest value at a strain above 0; smooth: largest mean over a shear strain of 0.02; "
-         "ultimate: mean over the "
-         "last third of the strain\n"
+         "friction: along the shear of the stage; peak: largest value at a strain above 0; smooth: largest "
+         "mean over a shear strain of 0.02; ultimate: mean over the last third of the stage's strain\n"
+         "dilation: from the height of the bed when the stage began, or the first of several that shear one "
+         "after another\n"
          "energy in: work of wall and driven layer, and what the grains fell\n";
 }
 

@@ -102,15 +102,15 @@ class Runner {
 
   void run_stages(bool resuming) {
     if (!resuming) {
+      now_ = start_.before;
       now_.case_text = case_.resolved;
-      now_.state = start_.state, now_.water = start_.water;
     }
     now_.version = MORAINE_VERSION;
     const std::string header = "# moraine " MORAINE_VERSION ", " + engine_->describe() + ", seed " +
                                std::to_string(case_.grains.seed) + "\n";
     output::write_text(files_.resolved(), header + case_.resolved);
-    progress_->say((resuming ? "resumed: " : "") + case_.title + ": " + std::to_string(start_.state.size()) +
-                   " grains, " + engine_->describe());
+    progress_->say((resuming ? "resumed: " : "") + case_.title + ": " +
+                   std::to_string(start_.before.state.size()) + " grains, " + engine_->describe());
     for (const std::string& w : warnings_) progress_->say("warning: " + w);
     series_ = std::make_unique<output::Series>(files_.series(), now_.rows, case_.has_water());
 
@@ -125,39 +125,34 @@ class Runner {
 
   void run_stage(std::size_t index, bool resuming) {
     now_.stage = static_cast<std::int64_t>(index);
-    Stage stage;
-    if (resuming) {
-      stage = describe(case_, index, now_.scene, now_.height_0, now_.state);
-      water_ = fill(stage, now_.state, now_.water, /*restart=*/true);
-      engine_->load(stage.scene, now_.state, water_.get());
-    } else {
-      if (!now_.rows.empty()) now_.stage_start_time = now_.rows.back().time;
-      dem::synchronise(now_.scene, now_.state);
-      stage = prepare(case_, index, start_, now_.state);
-      water_ = fill(stage, now_.state, now_.water, /*restart=*/false);
-      engine_->load(stage.scene, now_.state, water_.get());
+    Stage stage = resuming ? describe(case_, index, now_) : prepare(case_, index, start_, now_);
+    water_ = fill(stage, now_.state, now_.water, /*under_way=*/stage.goes_on);
+    engine_->load(stage.scene, now_.state, water_.get());
+    if (!resuming) {
+      for (const std::string& w : stage.warnings) warn(w);
       take_state();
-      now_.scene = stage.scene, now_.height_0 = stage.height_0;
-      if (case_.automatic_dt) {
+      now_.scene = stage.scene;
+      if (case_.automatic_dt && !stage.goes_on) {
         now_.critical_at = -steps_between_estimates;
         follow_bed(stage);
       }
-      now_.energy_0 = dem::observe(stage.scene, now_.state).energy.total();
+      begin(stage);
       record(stage);
       snapshot(stage);
       if (index == 0) save();
     }
     char text[200];
     std::int64_t step = now_.state.step;
-    const std::int64_t steps = last_step(stage);
-    std::snprintf(text, sizeof text, "stage %s: %lld steps of %.3g s%s", stage.name.c_str(),
+    const std::int64_t steps = last_step(stage) - stage.first_step;
+    std::snprintf(text, sizeof text, "stage %s: %lld steps of %.3g s%s%s", stage.name.c_str(),
                   static_cast<long long>(steps), stage.scene.dt,
-                  case_.automatic_dt ? ", which follows the bed" : "");
+                  case_.automatic_dt ? ", which follows the bed" : "",
+                  stage.goes_on && !resuming ? "; goes on as the one before" : "");
     progress_->say(text);
     if (water_) progress_->say(water_->describe() + "; " + stability_of(*water_, stage.scene.dt));
-    progress_->begin(stage.name, step, steps, 0);
+    progress_->begin(stage.name, step - stage.first_step, steps, 0);
 
-    Guard guard(case_.guards, stage, now_.rows);
+    Guard guard(case_.guards, stage, now_.rows, now_.start);
     std::int64_t slice = at_exchange(stage, 64);  // steps between looks at the clock
     for (bool ended = step >= last_step(stage); !ended;) {
       const Event event = next_event(stage, step);
@@ -182,8 +177,9 @@ class Runner {
         if (event.snapshot) snapshot(stage);
       }
       if (case_.automatic_dt && !ended && (due || step == estimate)) follow_bed(stage);
-      if (options_.on_progress) options_.on_progress(index, step, std::max<std::int64_t>(step, steps));
-      progress_->show({step, stage.scene.time(step), now_.rows.back().unbalanced_force});
+      const std::int64_t done = step - stage.first_step;
+      if (options_.on_progress) options_.on_progress(index, done, std::max<std::int64_t>(done, steps));
+      progress_->show({done, stage.time(step), now_.rows.back().unbalanced_force});
       if (ended && water_) progress_->say("water, " + water_->solver());
       const bool stop = stop_requested;
       if (stop || ended || seconds_since_save() > case_.output.checkpoint_interval) {
@@ -191,8 +187,24 @@ class Runner {
         if (due || guard.finds_healthy(now_.state)) save();
       }
       if (stop)
-        throw error("interrupted at step ", step, " of stage ", stage.name, "; --resume goes on from here");
+        throw error("interrupted at step ", done, " of stage ", stage.name, "; --resume goes on from here");
     }
+  }
+
+  void warn(const std::string& words) {
+    if (std::find(warnings_.begin(), warnings_.end(), words) == warnings_.end())
+      progress_->say("warning: " + words);
+  }
+
+  // What the rows of the stage count from.
+  void begin(const Stage& stage) {
+    output::StageStart& start = now_.start;
+    start.step = stage.first_step, start.clock = stage.first_time;
+    start.time = now_.rows.empty() ? 0 : now_.rows.back().time;
+    start.energy = dem::observe(stage.scene, now_.state).energy.total();
+    start.ledger = now_.state.ledger;
+    start.drained_top = now_.water.drained_top, start.drained_bottom = now_.water.drained_bottom;
+    start.water_dissipated = now_.water.dissipated;
   }
 
   // The time step from here on.
@@ -208,9 +220,8 @@ class Runner {
   }
 
   void record(const Stage& stage) {
-    now_.rows.push_back(row_of(static_cast<std::size_t>(now_.stage), stage, now_.state, now_.stage_start_time,
-                               now_.energy_0));
-    if (water_) add_water(now_.rows.back(), stage, *water_);
+    now_.rows.push_back(row_of(static_cast<std::size_t>(now_.stage), stage, now_.state, now_.start));
+    if (water_) add_water(now_.rows.back(), stage, *water_, now_.start);
     if (!water_ && case_.has_water()) now_.rows.back().total_friction = now_.rows.back().shear_friction;
     series_->append(now_.rows.back());
   }
@@ -218,8 +229,8 @@ class Runner {
   void snapshot(const Stage& stage) {
     char name[80];
     std::snprintf(name, sizeof name, "%02d-%s-%06lld", static_cast<int>(now_.stage) + 1, stage.name.c_str(),
-                  static_cast<long long>(std::ceil(
-                      (stage.scene.time(now_.state.step) - 0.5 * stage.scene.dt) / stage.snapshot_interval)));
+                  static_cast<long long>(std::ceil((stage.time(now_.state.step) - 0.5 * stage.scene.dt) /
+                                                   stage.snapshot_interval)));
     now_.snapshots.push_back(output::write_snapshot(files_.snapshots(), name, now_.rows.back().time,
                                                     stage.scene, now_.state,
                                                     water_ ? std::optional(water_->fields()) : std::nullopt));

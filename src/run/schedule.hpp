@@ -13,7 +13,7 @@ namespace moraine::run {
 constexpr std::int64_t steps_between_estimates = 1000;
 
 struct Event {
-  double time;        // s of the stage
+  double time;        // s, of the scene's clock
   std::int64_t step;  // nearest to it, with the present dt; an exchange where there is pore water
   bool series, snapshot, end;
 };

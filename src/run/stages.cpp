@@ -4,10 +4,11 @@
 #include <cmath>
 
 #include "dem/engine.hpp"
+#include "dem/features.hpp"
+#include "dem/observe.hpp"
 #include "dem/order.hpp"
 #include "dem/packing.hpp"
 #include "error.hpp"
-#include "output/files.hpp"
 #include "run/schedule.hpp"
 
 namespace moraine::run {
@@ -16,65 +17,50 @@ namespace {
 
 using Kind = cases::Stage::Kind;
 
-bool shears(Kind k) { return k == Kind::shear || k == Kind::shear_stress; }
-
-double bed_top(const dem::State& s) {
-  double top = 0;
-  for (dem::Index i = 0; i < s.size(); ++i) top = std::max(top, s.x[i].z + s.r[i]);
-  return top;
-}
-
 // kg; 0.001 rho N pi (cell/2)^3 gives the 6.4 kg of Table 1.
 double default_wall_mass(const cases::Case& c, double grains, double cell) {
   return 0.001 * c.grains.density * grains * std::numbers::pi * std::pow(cell / 2, 3);
 }
 
-// par. 26: the lowest and the highest layer, by grain centres. They keep their part through several shear
-// stages.
-void choose_layers(const cases::Stage& stage, dem::State& s) {
-  if (std::any_of(s.role.begin(), s.role.end(), [](dem::Role r) { return r != dem::Role::free; })) return;
-  const double largest = 2 * *std::max_element(s.r.begin(), s.r.end());
-  const double bottom = stage.bottom_layer < 0 ? largest : stage.bottom_layer;
-  const double top = bed_top(s) - (stage.top_layer < 0 ? largest : stage.top_layer);
-  for (dem::Index i = 0; i < s.size(); ++i)
-    s.role[i] = s.x[i].z < bottom ? dem::Role::bottom : s.x[i].z > top ? dem::Role::top : dem::Role::free;
-  if (std::count(s.role.begin(), s.role.end(), dem::Role::top) == 0)
-    throw error("stage ", stage.name, ": no grain lies in the top layer; expected a thicker top_layer");
-  s.x_start = s.x;  // displacement counts from here
-}
-
-void set_top_wall(const cases::Case& c, const cases::Stage& stage, const Start& start, dem::Scene& scene,
-                  dem::State& s) {
+dem::TopWall top_wall_of(const cases::Case& c, const cases::Stage& stage, const Start& start, double height) {
   using Wanted = cases::Stage::TopWall;
-  using dem::TopWall;
-  Wanted wanted = stage.top_wall;
-  TopWall& wall = scene.top_wall;
-  if (wanted == Wanted::automatic && stage.kind == Kind::uniaxial) {
-    wall.drive = TopWall::Drive::velocity;
-  } else {
-    if (wanted == Wanted::automatic) wanted = stage.kind == Kind::settle ? Wanted::none : Wanted::stress;
-    wall.drive = wanted == Wanted::none     ? TopWall::Drive::none
-                 : wanted == Wanted::stress ? TopWall::Drive::stress
-                                            : TopWall::Drive::velocity;
-  }
-  if (wall.drive == TopWall::Drive::none) {
-    s.wall_z = 0;
-    return;
-  }
-  if (s.wall_z <= 0) s.wall_z = bed_top(s);  // lowered onto the highest grain
-  if (stage.kind == Kind::uniaxial) wall.velocity = -stage.strain_rate * s.wall_z;
+  using Drive = dem::TopWall::Drive;
+  const bool automatic = stage.top_wall == Wanted::automatic;
+  dem::TopWall wall;
+  if (stage.top_wall == Wanted::fixed || (automatic && stage.kind == Kind::uniaxial))
+    wall.drive = Drive::velocity;
+  else if (stage.top_wall == Wanted::stress || (automatic && stage.kind != Kind::settle))
+    wall.drive = Drive::stress;
+  if (wall.drive == Drive::none) return wall;
+  if (stage.kind == Kind::uniaxial) wall.velocity = -stage.strain_rate * height;
   wall.mass = c.wall_mass > 0 ? c.wall_mass : start.wall_mass;
   wall.sigma_0 = stage.normal_stress, wall.amplitude = stage.normal_stress_amplitude;
   wall.frequency = stage.normal_stress_frequency, wall.phase = stage.normal_stress_phase;
+  return wall;
+}
+
+// All but the time step. height: m, H_0.
+dem::Scene scene_of(const cases::Case& c, const cases::Stage& stage, const Start& start, double height) {
+  dem::Scene scene;
+  scene.box = {start.box_x, start.box_y, start.box_z};
+  scene.periodic_x = c.periodic_x, scene.periodic_y = c.periodic_y, scene.periodic_z = c.periodic_z;
+  scene.floor = c.floor, scene.gravity = c.gravity, scene.density = c.grains.density;
+  scene.grain = {c.k_n, c.k_t, stage.gamma_n, stage.gamma_t, stage.mu_s, stage.mu_d};
+  scene.wall = {c.k_n, c.wall_k_t, stage.wall_gamma_n, stage.wall_gamma_t, stage.wall_mu, stage.wall_mu};
+  scene.neighbour_margin = c.neighbour_margin, scene.ledger = c.ledger;
+  scene.fluid_density = stage.fluid ? c.fluid.density : 0;
+  scene.top_wall = top_wall_of(c, stage, start, height);
+  if (!shears(stage.kind)) return scene;
+  scene.shear.drive = stage.kind == Kind::shear ? dem::Shear::Drive::velocity : dem::Shear::Drive::stress;
+  scene.shear.velocity = stage.velocity != 0 ? stage.velocity : stage.strain_rate * height;
+  scene.shear.stress = stage.shear_stress;
+  scene.shear.hold_z = stage.hold_layer_height;
+  return scene;
 }
 
 }  // namespace
 
-double mean_diameter(const dem::State& s) {
-  double sum = 0;
-  for (const double r : s.r) sum += 2 * r;
-  return sum / s.size();
-}
+bool shears(Kind k) { return k == Kind::shear || k == Kind::shear_stress; }
 
 // dt = f sqrt(min m / max k), eq. 9; the walls count among the k.
 double step_by_eq_9(const dem::Scene& scene, const dem::State& s, double f) {
@@ -82,19 +68,26 @@ double step_by_eq_9(const dem::Scene& scene, const dem::State& s, double f) {
   return f * std::sqrt(m / std::max({scene.grain.k_n, scene.grain.k_t, scene.wall.k_n, scene.wall.k_t}));
 }
 
+static double step_of(const cases::Case& c, const cases::Stage& stage, const dem::Scene& scene,
+                      const dem::State& s) {
+  return c.dt > 0 ? c.dt : step_by_eq_9(scene, s, stage.f);
+}
+
 Start start_of(const cases::Case& c) {
   if (!c.start.empty()) {
-    output::Checkpoint before = output::read_checkpoint(c.start);
-    dem::synchronise(before.scene, before.state);
-    if (!before.finished)
+    Start s{output::read_checkpoint(c.start), c.box_x, c.box_y, c.box_z, 0};
+    if (!s.before.finished)
       throw error(c.start.string(), ": the case it belongs to has not finished; run it to its end first");
-    Start s{std::move(before.state), before.scene.box.x,         before.scene.box.y,
-            before.scene.box.z,      before.scene.top_wall.mass, std::move(before.water)};
-    if (c.box_x > 0) s.box_x = c.box_x;
-    if (c.box_y > 0) s.box_y = c.box_y;
-    if (c.box_z > 0) s.box_z = c.box_z;
-    const double r_max = *std::max_element(s.state.r.begin(), s.state.r.end());
-    if (s.wall_mass <= 0) s.wall_mass = default_wall_mass(c, s.state.size(), c.grains.cell * 2 * r_max);
+    s.before.rows.clear(), s.before.snapshots.clear();
+    s.before.finished = false;
+    const dem::Scene& scene = s.before.scene;
+    if (s.box_x <= 0) s.box_x = scene.box.x;
+    if (s.box_y <= 0) s.box_y = scene.box.y;
+    if (s.box_z <= 0) s.box_z = scene.box.z;
+    const dem::State& state = s.before.state;
+    const double r_max = *std::max_element(state.r.begin(), state.r.end());
+    s.wall_mass = scene.top_wall.mass > 0 ? scene.top_wall.mass
+                                          : default_wall_mass(c, state.size(), c.grains.cell * 2 * r_max);
     return s;
   }
   const cases::Grains& g = c.grains;
@@ -107,8 +100,10 @@ Start start_of(const cases::Case& c) {
   p.seed = g.seed, p.columns_x = g.columns_x, p.columns_y = g.columns_y, p.cell = g.cell;
   p.box_x = c.box_x, p.box_y = c.box_y;
   dem::Lattice lattice = dem::make_lattice(p);
-  const double wall_mass = default_wall_mass(c, lattice.state.size(), lattice.cell);
-  return {std::move(lattice.state), lattice.box_x, lattice.box_y, c.box_z, wall_mass, {}};
+  Start s{
+      {}, lattice.box_x, lattice.box_y, c.box_z, default_wall_mass(c, lattice.state.size(), lattice.cell)};
+  s.before.state = std::move(lattice.state);
+  return s;
 }
 
 namespace {
@@ -152,20 +147,41 @@ coupling::Water water_of(const cases::Case& c, const cases::Stage& stage, const 
   w.sides.low[0] = side_of(f.x_low), w.sides.high[0] = side_of(f.x_high);
   w.sides.low[1] = side_of(f.y_low), w.sides.high[1] = side_of(f.y_high);
   w.closure = coupling::Closure(int(f.closure));
-  // After a restart the interval of the stage: from other contacts another one would be chosen.
-  w.interval = scene.exchange_interval > 0 ? scene.exchange_interval : f.exchange_interval;
+  w.interval = f.exchange_interval;
   w.solver = coupling::Solver(int(f.solver)), w.tolerance = f.tolerance;
   return w;
+}
+
+// Whether the stage asks for just what drives the grains already.
+bool goes_on(const cases::Case& c, const cases::Stage& stage, const Start& start,
+             const output::Checkpoint& now) {
+  if (!now.state.staggered || stage.zero_kinematics || stage.clear_history) return false;
+  const dem::Scene& before = now.scene;
+  dem::Scene scene = scene_of(c, stage, start, now.height_0);
+  scene.dt = c.automatic_dt ? before.dt : step_of(c, stage, scene, now.state);
+  scene.time_0 = before.time_0, scene.step_0 = before.step_0;
+  scene.exchange_interval = before.exchange_interval;
+  scene.neighbour_margin = before.neighbour_margin;
+  return scene == before &&
+         water_of(c, stage, scene, now.height_0, mean_diameter(now.state)) == now.water_settings;
+}
+
+// Of a stage that shears on with the layers of the one before.
+bool asks_for_other_layers(const cases::Case& c, std::size_t index) {
+  const cases::Stage& stage = c.stages[index];
+  if (index == 0) return stage.bottom_layer >= 0 || stage.top_layer >= 0;
+  const cases::Stage& before = c.stages[index - 1];
+  return stage.bottom_layer != before.bottom_layer || stage.top_layer != before.top_layer;
 }
 
 }  // namespace
 
 std::unique_ptr<coupling::PoreWater> fill(Stage& stage, const dem::State& grains,
-                                          const coupling::WaterState& before, bool restart) {
+                                          const coupling::WaterState& before, bool under_way) {
   if (!stage.water.present) return nullptr;
-  auto water = coupling::make_pore_water(stage.water, stage.scene, grains, before, restart);
+  auto water = coupling::make_pore_water(stage.water, stage.scene, grains, before, under_way);
   stage.scene.exchange_interval = water->interval();
-  if (last_step(stage) < stage.scene.exchange_interval)
+  if (last_step(stage) - stage.first_step < stage.scene.exchange_interval)
     throw error("stage ", stage.name, ": lasts ", stage.duration, " s, less than the ",
                 static_cast<double>(water->interval()) * stage.scene.dt,
                 " s between two exchanges of grains and water (", water->interval(),
@@ -173,30 +189,30 @@ std::unique_ptr<coupling::PoreWater> fill(Stage& stage, const dem::State& grains
   return water;
 }
 
-Stage describe(const cases::Case& c, std::size_t index, const dem::Scene& scene, double height_0,
-               const dem::State& state) {
+Stage describe(const cases::Case& c, std::size_t index, const output::Checkpoint& now) {
   const cases::Stage& stage = c.stages.at(index);
   Stage out;
-  out.name = stage.name, out.kind = stage.kind, out.scene = scene, out.height_0 = height_0;
-  out.diameter = mean_diameter(state);
-  out.water = water_of(c, stage, scene, height_0, out.diameter);
-  out.strain_rate = shears(stage.kind) ? scene.shear.velocity / height_0 : stage.strain_rate;
+  out.name = stage.name, out.kind = stage.kind;
+  out.scene = now.scene, out.water = now.water_settings, out.height_0 = now.height_0;
+  out.goes_on = true;
+  out.first_step = now.start.step, out.first_time = now.start.clock;
+  out.diameter = mean_diameter(now.state);
+  out.strain_rate = shears(stage.kind) ? now.scene.shear.velocity / now.height_0 : stage.strain_rate;
   out.duration = stage.duration > 0 ? stage.duration : stage.strain / std::abs(out.strain_rate);
   out.series_interval = c.output.series_interval, out.snapshot_interval = c.output.snapshot_interval;
   return out;
 }
 
-Stage prepare(const cases::Case& c, std::size_t index, const Start& start, dem::State& s) {
+Stage prepare(const cases::Case& c, std::size_t index, const Start& start, output::Checkpoint& now) {
   const cases::Stage& stage = c.stages.at(index);
-  dem::Scene scene;
-  scene.box = {start.box_x, start.box_y, start.box_z};
-  scene.periodic_x = c.periodic_x, scene.periodic_y = c.periodic_y, scene.periodic_z = c.periodic_z;
-  scene.floor = c.floor, scene.gravity = c.gravity, scene.density = c.grains.density;
-  scene.grain = {c.k_n, c.k_t, stage.gamma_n, stage.gamma_t, stage.mu_s, stage.mu_d};
-  scene.wall = {c.k_n, c.wall_k_t, stage.wall_gamma_n, stage.wall_gamma_t, stage.wall_mu, stage.wall_mu};
-  scene.neighbour_margin = c.neighbour_margin, scene.ledger = c.ledger;
-  scene.fluid_density = stage.fluid ? c.fluid.density : 0;
-
+  dem::State& s = now.state;
+  if (goes_on(c, stage, start, now)) {
+    now.scene.neighbour_margin = c.neighbour_margin;
+    now.start.step = s.step, now.start.clock = now.scene.time(s.step);
+    return describe(c, index, now);
+  }
+  if (s.staggered && !dem::features_of(now.scene).softening) dem::mark_slipping(now.scene, s);
+  dem::synchronise(now.scene, s);
   if (stage.zero_kinematics) {
     for (auto* v : {&s.v, &s.omega, &s.rotation}) std::fill(v->begin(), v->end(), dem::Vec3d{0, 0, 0});
     s.wall_v = s.layer_u = 0;
@@ -205,27 +221,36 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, dem::
     for (dem::Contact& contact : s.contacts) contact.delta_t = {0, 0, 0}, contact.slipping = 0;
     for (dem::WallContact& w : s.wall_contacts) w.delta_t = {0, 0, 0}, w.slipping = 0;
   }
-  set_top_wall(c, stage, start, scene, s);
-  const double height_0 = s.wall_z > 0 ? s.wall_z : bed_top(s);
-  if (shears(stage.kind)) {
-    choose_layers(stage, s);
-    scene.shear.drive = stage.kind == Kind::shear ? dem::Shear::Drive::velocity : dem::Shear::Drive::stress;
-    scene.shear.velocity = stage.velocity != 0 ? stage.velocity : stage.strain_rate * height_0;
-    scene.shear.stress = stage.shear_stress;
-    scene.shear.hold_z = stage.hold_layer_height;
-  } else {
+  if (top_wall_of(c, stage, start, 0).drive == dem::TopWall::Drive::none)
+    s.wall_z = 0;
+  else if (s.wall_z <= 0)
+    s.wall_z = bed_top(s);  // lowered onto the highest grain
+  const double height = s.wall_z > 0 ? s.wall_z : bed_top(s);
+  std::vector<std::string> warnings;
+  if (!shears(stage.kind)) {
     std::fill(s.role.begin(), s.role.end(), dem::Role::free);
     s.x_start = s.x;
     s.layer_u = 0;
+    now.height_0 = height;
+  } else if (std::ranges::all_of(s.role, [](dem::Role r) { return r == dem::Role::free; })) {
+    warnings = choose_layers(stage, s);
+    s.x_start = s.x;  // displacement counts from here
+    now.height_0 = height;
+  } else if (asks_for_other_layers(c, index)) {
+    warnings = {"stage " + stage.name +
+                ": bottom_layer and top_layer do not count: the layers are those of the shear before it"};
   }
   s.step = 0, s.staggered = false, s.ledger = {};
   s.water_force.clear(), s.water = {};
+  now.start = {};
+  dem::Scene scene = scene_of(c, stage, start, now.height_0);
   dem::sort_spatially(scene, s);
-  scene.dt = c.automatic_dt ? c.safety * critical_step(scene, s)
-             : c.dt > 0     ? c.dt
-                            : step_by_eq_9(scene, s, stage.f);
-  Stage out = describe(c, index, scene, height_0, s);
-  if (c.automatic_dt) fit_step(out, s, scene.dt);
+  scene.dt = c.automatic_dt ? c.safety * critical_step(scene, s) : step_of(c, stage, scene, s);
+  now.scene = scene;
+  now.water_settings = water_of(c, stage, scene, now.height_0, mean_diameter(s));
+  Stage out = describe(c, index, now);
+  out.goes_on = false, out.warnings = warnings;
+  if (c.automatic_dt) fit_step(out, s, scene.dt), now.scene = out.scene;
   return out;
 }
 

@@ -1,20 +1,24 @@
 // From a checked case to what the engine needs: the grains at the start, and for each stage its scene, its
 // duration, and the state made ready (Damsgaard et al. 2013, par. 26).
 #pragma once
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "case/case.hpp"
 #include "coupling/pore_water.hpp"
 #include "dem/scene.hpp"
 #include "dem/state.hpp"
+#include "output/files.hpp"
+#include "run/layers.hpp"
 
 namespace moraine::run {
 
 struct Start {
-  dem::State state;            // velocities at the step, not staggered
+  output::Checkpoint
+      before;  // the grains, and how an earlier case has left them (scene.dt = 0: there was none)
   double box_x, box_y, box_z;  // m
   double wall_mass;            // kg
-  coupling::WaterState water;  // that the case before has left; empty where it was dry
 };
 // Draws the grains, or reads them from case.start.
 Start start_of(const cases::Case& c);
@@ -24,26 +28,40 @@ struct Stage {
   cases::Stage::Kind kind;
   dem::Scene scene;
   coupling::Water water;
+  bool goes_on;                               // as the stage before: nothing changes, not even a bit
+  std::int64_t first_step;                    // of the scene's clock, as the next one
+  double first_time;                          // s
   double duration;                            // s
   double series_interval, snapshot_interval;  // s
-  double height_0;                            // m
+  double height_0;                            // m, H_0 of strain and dilation
   double diameter;                            // m, mean of the grains
   double strain_rate;                         // 1/s, nominal: u/H_0, or axial
+  std::vector<std::string> warnings;
+
+  double time(std::int64_t step) const { return scene.time(step) - first_time; }  // s, since it began
+  double end() const { return first_time + duration; }                            // s, on the scene's clock
 };
 
-// Makes `state` ready for stage `index` of the case and returns what drives it. `start` gives box and wall
-// mass.
-Stage prepare(const cases::Case& c, std::size_t index, const Start& start, dem::State& state);
-// The same without touching a state that is under way already (after a restart).
-Stage describe(const cases::Case& c, std::size_t index, const dem::Scene& scene, double height_0,
-               const dem::State& state);
+// Whether the kind of stage drives a layer of grains along x.
+bool shears(cases::Stage::Kind kind);
 
-// The pore water of a stage, null where it is dry; and the exchange interval that it sets. restart: go on
+// Makes the grains of `now` ready for stage `index` of the case and returns what drives them; scene,
+// water_settings, height_0 and the beginning of the clock of `now` become those of the stage. `start` gives
+// box and wall mass.
+//
+// A stage that asks for just what drives the grains already, and does not set them to zero, goes on as the
+// one before, clock and sinusoids included: a stage that is cut in two ends with the same bits. Else the
+// clock begins at 0. Stages that shear one after another keep their layers, and with them H_0 and what
+// displacement and shear strain are counted from. Throws Error where no grain is left between the layers.
+Stage prepare(const cases::Case& c, std::size_t index, const Start& start, output::Checkpoint& now);
+// The stage that is under way already (after a restart).
+Stage describe(const cases::Case& c, std::size_t index, const output::Checkpoint& now);
+
+// The pore water of a stage, null where it is dry; and the exchange interval that it sets. under_way: go on
 // with the same bits. Throws Error where that is impossible (coupling/pore_water.hpp).
 std::unique_ptr<coupling::PoreWater> fill(Stage& stage, const dem::State& grains,
-                                          const coupling::WaterState& before, bool restart);
+                                          const coupling::WaterState& before, bool under_way);
 
-double mean_diameter(const dem::State& s);                                    // m
 double step_by_eq_9(const dem::Scene& scene, const dem::State& s, double f);  // s
 
 }  // namespace moraine::run

@@ -18,9 +18,9 @@ Checkpoint sample(dem::Index grains) {
   c.case_text = "title = \"Grund \xc3\xbc\"\n" + std::string(200'000, '#');
   c.version = "1.2.3";
   c.stage = 2;
-  c.stage_start_time = number();
+  c.start.time = number(), c.start.step = 12;
   c.height_0 = -0.0;
-  c.energy_0 = std::numeric_limits<double>::denorm_min();
+  c.start.energy = std::numeric_limits<double>::denorm_min();
   c.finished = true;
   c.scene.box = number.vector();
   c.scene.periodic_y = false;
@@ -80,7 +80,7 @@ TEST_F(CheckpointFile, KeepsEveryBit) {
     EXPECT_EQ(read.water.q, written.water.q);
     EXPECT_EQ(read.water.x_map, written.water.x_map);
     EXPECT_TRUE(std::signbit(read.height_0));
-    EXPECT_EQ(read.energy_0, written.energy_0);
+    EXPECT_EQ(read.start.energy, written.start.energy);
     ASSERT_EQ(read.rows.size(), written.rows.size());
     EXPECT_TRUE(std::equal(read.rows.begin(), read.rows.end(), written.rows.begin(), same_bits));
 

@@ -86,8 +86,9 @@ class Program : public testing::Test {
     return R"(
 [grains]
 count = 300
-columns_x = 6
-columns_y = 6
+columns_x = 5
+columns_y = 5
+cell = 1.3
 seed = 3
 [contact]
 k_n = "2e5 N/m"

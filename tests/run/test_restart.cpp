@@ -95,10 +95,10 @@ TEST_F(Program, AnyStepMayBeTheFirstAfterARestart) {
   const cases::Case c = cases::load(small);
   const run::Start start = run::start_of(c);
   for (const dem::Backend backend : {dem::Backend::cpu, dem::Backend::reference}) {
-    dem::State state = start.state;
-    const run::Stage stage = run::prepare(c, 0, start, state);
+    output::Checkpoint now = start.before;
+    const run::Stage stage = run::prepare(c, 0, start, now);
     const auto engine = dem::make_engine(backend, 1), other = dem::make_engine(backend, 1);
-    engine->load(stage.scene, state);
+    engine->load(stage.scene, now.state);
     engine->advance(2000);
     for (int k = 2000; k < 2500; ++k) {
       other->load(stage.scene, engine->state());

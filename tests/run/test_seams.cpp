@@ -1,0 +1,121 @@
+// A stage that is cut in two, so that nothing changes between the halves, ends with the bits of the uncut
+// one: grains, springs, what slips, walls, layers, ledger, water. Between two stages of one case, and with
+// `start`.
+#include "program.hpp"
+
+namespace moraine {
+namespace {
+
+struct Kind {
+  const char* name;
+  const char* keys;   // of the case
+  const char* stage;  // of the stage that is cut
+  double half;        // s, duration of either half: whole records, exact in binary
+};
+
+// Beside the bed that each starts from. Records every 1/64 s.
+const Kind kinds[] = {
+    {"settle", "", "kind = \"settle\"\n", 0.0625},
+    {"consolidate", "", "kind = \"consolidate\"\nnormal_stress = 3000\n", 0.0625},
+    {"shear", "", "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\n", 0.0625},
+    {"backwards", "", "kind = \"shear\"\nnormal_stress = 2000\nvelocity = -0.2\n", 0.0625},
+    {"softening", "", "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nmu_s = 0.6\nmu_d = 0.3\n",
+     0.0625},
+    {"damped", "",
+     "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\ngamma_n = 5\ngamma_t = 3\n"
+     "mu_s = 0.6\nmu_d = 0.4\nwall_gamma_n = 20\nwall_mu = 0.3\nwall_gamma_t = 10\n",
+     0.0625},
+    {"wall_springs", "[wall]\nk_t = 2e5\n", "kind = \"consolidate\"\nnormal_stress = 2000\nwall_mu = 0.2\n",
+     0.0625},
+    {"tide", "",
+     "kind = \"shear\"\nnormal_stress = 2000\nnormal_stress_amplitude = 500\n"
+     "normal_stress_frequency = 7\nnormal_stress_phase = 1\nstrain_rate = 1\n",
+     0.0625},
+    {"creep", "",
+     "kind = \"shear_stress\"\nnormal_stress = 2000\nshear_stress = 900\nmu_s = 0.6\nmu_d = 0.3\n", 0.0625},
+    {"uniaxial", "", "kind = \"uniaxial\"\nstrain_rate = 0.3\n", 0.0625},
+    {"fixed", "", "kind = \"shear\"\ntop_wall = \"fixed\"\nstrain_rate = 1\nhold_layer_height = true\n",
+     0.0625},
+    {"no_ledger", "[model]\nledger = false\n", "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\n",
+     0.0625},
+    {"automatic_dt", "[model]\ndt = \"auto\"\n", "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\n",
+     0.125},
+    {"sides", "[box]\nperiodic = \"y\"\n", "kind = \"settle\"\n", 0.0625},
+    {"frictionless", "", "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nmu_s = 0\n", 0.0625},
+    {"wet",
+     "[fluid]\nenabled = true\nviscosity = 1.8e-3\ncompressibility = 1e-6\npermeability_factor = 1e-9\n",
+     "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nmu_s = 0.6\nmu_d = 0.3\n", 0.0625},
+    {"wet_tide",
+     "[fluid]\nenabled = true\nviscosity = 1.8e-3\ncompressibility = 1e-6\npermeability_factor = 1e-9\n",
+     "kind = \"consolidate\"\nnormal_stress = 2000\ntop_pressure = 100\ntop_pressure_amplitude = 300\n"
+     "top_pressure_frequency = 5\n",
+     0.0625},
+    {"undrained", "[fluid]\nenabled = true\ncompressibility = 1e-6\nexchange_interval = 1\n",
+     "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nfluid_top = \"impermeable\"\n", 0.0625},
+    {"wet_settle", "[fluid]\nenabled = true\ncompressibility = 1e-6\nheight = 0.5\n", "kind = \"settle\"\n",
+     0.0625},
+};
+
+class Seams : public Program, public testing::WithParamInterface<Kind> {
+ protected:
+  static std::string bed_case() { return "stages = [\"settle\", \"consolidate\"]\n" + small_case(); }
+
+  static std::string head() {
+    return "extends = \"../bed\"\n[output]\nseries_interval = 0.015625\nsnapshot_interval = 1\n";
+  }
+  std::string stage(const std::string& name, double duration, const std::string& more = {}) const {
+    return "[[stage]]\nname = \"" + name + "\"\nduration = " + std::to_string(duration) + "\n" +
+           GetParam().stage + more;
+  }
+
+  // The bytes of the last state, without what counts stages and rows.
+  std::string end_of(const fs::path& run) const {
+    output::Checkpoint c = output::read_checkpoint(checkpoint_of(run));
+    c.case_text = "", c.stage = 0, c.start = {}, c.rows.clear(), c.snapshots.clear();
+    output::write_checkpoint(directory.path() / "aside.h5", c);
+    return contents(directory.path() / "aside.h5");
+  }
+  std::vector<output::Row> rows(const fs::path& run) const { return output::read_series(series_of(run)); }
+};
+
+TEST_P(Seams, ACutStageEndsWithTheBitsOfTheUncutOne) {
+  const Kind& kind = GetParam();
+  ASSERT_NO_FATAL_FAILURE(run(make("bed", bed_case())));
+  const auto text = [&](const std::string& start, const std::string& stages, const std::string& named) {
+    return "start = \"../" + start + "\"\nstages = [" + named + "]\n" + head() + kind.keys + stages;
+  };
+  const fs::path whole = make("whole", text("bed", stage("one", 2 * kind.half), "\"one\""));
+  const fs::path cut =
+      make("cut", text("bed", stage("one", kind.half) + stage("two", kind.half), "\"one\", \"two\""));
+  const fs::path half = make("half", text("bed", stage("one", kind.half), "\"one\""));
+  const fs::path rest =
+      make("rest", text("half", stage("two", kind.half, "zero_kinematics = false\n"), "\"two\""));
+  for (const fs::path& one : {whole, cut, half, rest}) ASSERT_NO_FATAL_FAILURE(run(one));
+  EXPECT_NE(contents(cut / "output/log.txt").find("goes on as the one before"), std::string::npos);
+  EXPECT_TRUE(end_of(whole) == end_of(cut)) << "two stages of one case";
+  EXPECT_TRUE(end_of(whole) == end_of(rest)) << "a case that starts from another";
+
+  // Strain, dilation and forces of the rows go on, too; what each stage has done adds up.
+  const auto one = rows(whole), two = rows(cut);
+  ASSERT_EQ(one.size() + 1, two.size());  // the seam has a row of either side
+  const std::size_t seam = one.size() / 2;
+  for (std::size_t k = 0; k < two.size(); ++k) {
+    const output::Row &a = one[k > seam ? k - 1 : k], &b = two[k];
+    SCOPED_TRACE("row " + std::to_string(k));
+    EXPECT_EQ(a.shear_strain, b.shear_strain);
+    EXPECT_EQ(a.dilation, b.dilation);
+    EXPECT_EQ(a.shear_stress, b.shear_stress);
+    EXPECT_EQ(a.normal_stress, b.normal_stress);
+    EXPECT_EQ(a.kinetic, b.kinetic);
+    EXPECT_NEAR(a.time, b.time, 1e-12);
+  }
+  EXPECT_NEAR(one.back().slip, two[seam].slip + two.back().slip, 1e-9 * std::abs(one.back().slip));
+  EXPECT_NEAR(one.back().top_wall_work, two[seam].top_wall_work + two.back().top_wall_work,
+              1e-9 * std::abs(one.back().top_wall_work));
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryKind, Seams, testing::ValuesIn(kinds),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+}  // namespace
+}  // namespace moraine
