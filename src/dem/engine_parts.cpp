@@ -101,20 +101,25 @@ void append_grain(State& s, const GrainRow& g, const LoadRow& load, Role role) {
   s.role.push_back(role);
 }
 
-// Without friction there is no spring, whatever an earlier stage has left.
-static bool holds_spring(const ContactParameters& p) { return p.k_t > 0 && p.mu_s > 0; }
+// What a contact remembers under this law: without friction there is no spring, and without softening it does
+// not matter whether it slips, whatever an earlier stage has left.
+static Spring<double> remembered(const ContactParameters& p, const Spring<double>& s) {
+  return {p.k_t > 0 && p.mu_s > 0 ? s.delta_t : Vec3d{}, p.mu_d < p.mu_s ? s.slipping : 0};
+}
 
 void append_contact(State& s, const Scene& scene, const Sides& sides, const GrainRow& a, const GrainRow& b,
                     Index i, Index j, const Spring<double>& spring) {
   if (!(between_grains(nearest_image(sides, a.x - b.x), a.r + b.r, a.r - b.r).delta_n < 0)) return;
-  s.contacts.push_back({i, j, holds_spring(scene.grain) ? spring.delta_t : Vec3d{}, spring.slipping});
+  const auto [delta_t, slipping] = remembered(scene.grain, spring);
+  s.contacts.push_back({i, j, delta_t, slipping});
 }
 
 void append_wall_contact(State& s, const Scene& scene, const Drive& drive, const GrainRow& g, Index i,
                          WallName wall, const Spring<double>& spring) {
   const bool top = wall == WallName::top;
   if (!(at_wall(g.x.z, g.r, top ? drive.wall_z : 0.0, top ? -1.0 : 1.0).delta_n < 0)) return;
-  s.wall_contacts.push_back({i, wall, holds_spring(scene.wall) ? spring.delta_t : Vec3d{}, spring.slipping});
+  const auto [delta_t, slipping] = remembered(scene.wall, spring);
+  s.wall_contacts.push_back({i, wall, delta_t, slipping});
 }
 
 void finish_state(State& s, const Drive& d) {

@@ -195,6 +195,7 @@ constexpr std::tuple members<StageStart>{
     Member{"time", &StageStart::time},
     Member{"step", &StageStart::step},
     Member{"clock", &StageStart::clock},
+    Member{"end", &StageStart::end},
     Member{"energy", &StageStart::energy},
     Member{"ledger", &StageStart::ledger},
     Member{"drained_top", &StageStart::drained_top},

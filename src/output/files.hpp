@@ -95,6 +95,7 @@ struct StageStart {
   double time = 0;        // s, since the case began
   std::int64_t step = 0;  // of the scene's clock; not 0 where the stage goes on as the one before
   double clock = 0;       // s, Scene::time(step)
+  double end = 0;         // s, of that clock: where the stage is to end, between two steps
   double energy = 0;      // J
   dem::Ledger ledger;
   double drained_top = 0, drained_bottom = 0;  // m3

@@ -139,6 +139,7 @@ class Runner {
       begin(stage);
       record(stage);
       snapshot(stage);
+      if (case_.automatic_dt && stage.goes_on) follow_bed(stage);  // as after any record
       if (index == 0) save();
     }
     char text[200];
@@ -199,7 +200,6 @@ class Runner {
   // What the rows of the stage count from.
   void begin(const Stage& stage) {
     output::StageStart& start = now_.start;
-    start.step = stage.first_step, start.clock = stage.first_time;
     start.time = now_.rows.empty() ? 0 : now_.rows.back().time;
     start.energy = dem::observe(stage.scene, now_.state).energy.total();
     start.ledger = now_.state.ledger;

@@ -32,14 +32,14 @@ Event next_event(const Stage& stage, std::int64_t step) {
   const dem::Scene& scene = stage.scene;
   const double series = next_multiple(scene, stage.series_interval, step);
   const double snapshot = next_multiple(scene, stage.snapshot_interval, step);
-  const double time = std::min({series, snapshot, stage.end()});
+  const double time = std::min({series, snapshot, stage.end});
   const std::int64_t at = step_at(scene, time);
-  const bool end = at >= step_at(scene, stage.end());
-  return {end ? stage.end() : time, std::max(at, step + between_exchanges(scene)),
+  const bool end = at >= step_at(scene, stage.end);
+  return {end ? stage.end : time, std::max(at, step + between_exchanges(scene)),
           end || at == step_at(scene, series), end || at == step_at(scene, snapshot), end};
 }
 
-std::int64_t last_step(const Stage& stage) { return step_at(stage.scene, stage.end()); }
+std::int64_t last_step(const Stage& stage) { return step_at(stage.scene, stage.end); }
 
 std::int64_t at_exchange(const Stage& stage, std::int64_t step) {
   const std::int64_t m = between_exchanges(stage.scene);

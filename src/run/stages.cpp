@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "dem/engine.hpp"
-#include "dem/features.hpp"
 #include "dem/observe.hpp"
 #include "dem/order.hpp"
 #include "dem/packing.hpp"
@@ -79,7 +78,7 @@ Start start_of(const cases::Case& c) {
     if (!s.before.finished)
       throw error(c.start.string(), ": the case it belongs to has not finished; run it to its end first");
     s.before.rows.clear(), s.before.snapshots.clear();
-    s.before.finished = false;
+    s.before.stage = 0, s.before.start.time = 0, s.before.finished = false;
     const dem::Scene& scene = s.before.scene;
     if (s.box_x <= 0) s.box_x = scene.box.x;
     if (s.box_y <= 0) s.box_y = scene.box.y;
@@ -166,6 +165,14 @@ bool goes_on(const cases::Case& c, const cases::Stage& stage, const Start& start
          water_of(c, stage, scene, now.height_0, mean_diameter(now.state)) == now.water_settings;
 }
 
+double nominal_rate(const cases::Stage& stage, const output::Checkpoint& now) {  // 1/s, u/H_0 or axial
+  return shears(stage.kind) ? now.scene.shear.velocity / now.height_0 : stage.strain_rate;
+}
+
+double duration_of(const cases::Stage& stage, double strain_rate) {  // s
+  return stage.duration > 0 ? stage.duration : stage.strain / std::abs(strain_rate);
+}
+
 // Of a stage that shears on with the layers of the one before.
 bool asks_for_other_layers(const cases::Case& c, std::size_t index) {
   const cases::Stage& stage = c.stages[index];
@@ -195,10 +202,10 @@ Stage describe(const cases::Case& c, std::size_t index, const output::Checkpoint
   out.name = stage.name, out.kind = stage.kind;
   out.scene = now.scene, out.water = now.water_settings, out.height_0 = now.height_0;
   out.goes_on = true;
-  out.first_step = now.start.step, out.first_time = now.start.clock;
+  out.first_step = now.start.step, out.first_time = now.start.clock, out.end = now.start.end;
   out.diameter = mean_diameter(now.state);
-  out.strain_rate = shears(stage.kind) ? now.scene.shear.velocity / now.height_0 : stage.strain_rate;
-  out.duration = stage.duration > 0 ? stage.duration : stage.strain / std::abs(out.strain_rate);
+  out.strain_rate = nominal_rate(stage, now);
+  out.duration = duration_of(stage, out.strain_rate);
   out.series_interval = c.output.series_interval, out.snapshot_interval = c.output.snapshot_interval;
   return out;
 }
@@ -209,9 +216,10 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, outpu
   if (goes_on(c, stage, start, now)) {
     now.scene.neighbour_margin = c.neighbour_margin;
     now.start.step = s.step, now.start.clock = now.scene.time(s.step);
+    now.start.end += duration_of(stage, nominal_rate(stage, now));
     return describe(c, index, now);
   }
-  if (s.staggered && !dem::features_of(now.scene).softening) dem::mark_slipping(now.scene, s);
+  if (s.staggered && now.scene.grain.mu_d == now.scene.grain.mu_s) dem::mark_slipping(now.scene, s);
   dem::synchronise(now.scene, s);
   if (stage.zero_kinematics) {
     for (auto* v : {&s.v, &s.omega, &s.rotation}) std::fill(v->begin(), v->end(), dem::Vec3d{0, 0, 0});
@@ -242,12 +250,13 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, outpu
   }
   s.step = 0, s.staggered = false, s.ledger = {};
   s.water_force.clear(), s.water = {};
-  now.start = {};
   dem::Scene scene = scene_of(c, stage, start, now.height_0);
   dem::sort_spatially(scene, s);
   scene.dt = c.automatic_dt ? c.safety * critical_step(scene, s) : step_of(c, stage, scene, s);
   now.scene = scene;
   now.water_settings = water_of(c, stage, scene, now.height_0, mean_diameter(s));
+  now.start = {};
+  now.start.end = duration_of(stage, nominal_rate(stage, now));
   Stage out = describe(c, index, now);
   out.goes_on = false, out.warnings = warnings;
   if (c.automatic_dt) fit_step(out, s, scene.dt), now.scene = out.scene;

@@ -30,8 +30,8 @@ struct Stage {
   coupling::Water water;
   bool goes_on;                               // as the stage before: nothing changes, not even a bit
   std::int64_t first_step;                    // of the scene's clock, as the next one
-  double first_time;                          // s
-  double duration;                            // s
+  double first_time, end;                     // s
+  double duration;                            // s, end - first_time but for the rounding to steps
   double series_interval, snapshot_interval;  // s
   double height_0;                            // m, H_0 of strain and dilation
   double diameter;                            // m, mean of the grains
@@ -39,7 +39,6 @@ struct Stage {
   std::vector<std::string> warnings;
 
   double time(std::int64_t step) const { return scene.time(step) - first_time; }  // s, since it began
-  double end() const { return first_time + duration; }                            // s, on the scene's clock
 };
 
 // Whether the kind of stage drives a layer of grains along x.

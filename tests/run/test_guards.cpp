@@ -168,7 +168,7 @@ TEST(Guard, NumbersThatAreNotFinite) {
   good.wall_z = 0.1;
   const auto check = [&](const dem::State& s) {
     try {
-      run::Guard({10, 0.2, 0.1}, stage, {output::Row{}}).check(s);
+      run::Guard({10, 0.2, 0.1}, stage, {output::Row{}}, {}).check(s);
     } catch (const Error& e) {
       return std::string(e.what());
     }

@@ -15,8 +15,9 @@ struct Kind {
 
 // Beside the bed that each starts from. Records every 1/64 s.
 const Kind kinds[] = {
-    {"settle", "", "kind = \"settle\"\n", 0.0625},
-    {"consolidate", "", "kind = \"consolidate\"\nnormal_stress = 3000\n", 0.0625},
+    {"settle", "", "kind = \"settle\"\nwall_gamma_n = 40\nwall_gamma_t = 40\n", 0.0625},
+    {"consolidate", "",
+     "kind = \"consolidate\"\nwall_gamma_n = 40\nwall_gamma_t = 40\nnormal_stress = 3000\n", 0.0625},
     {"shear", "", "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\n", 0.0625},
     {"backwards", "", "kind = \"shear\"\nnormal_stress = 2000\nvelocity = -0.2\n", 0.0625},
     {"softening", "", "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nmu_s = 0.6\nmu_d = 0.3\n",
@@ -25,7 +26,8 @@ const Kind kinds[] = {
      "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\ngamma_n = 5\ngamma_t = 3\n"
      "mu_s = 0.6\nmu_d = 0.4\nwall_gamma_n = 20\nwall_mu = 0.3\nwall_gamma_t = 10\n",
      0.0625},
-    {"wall_springs", "[wall]\nk_t = 2e5\n", "kind = \"consolidate\"\nnormal_stress = 2000\nwall_mu = 0.2\n",
+    {"wall_springs", "[wall]\nk_t = 2e5\n",
+     "kind = \"consolidate\"\nwall_gamma_n = 40\nwall_gamma_t = 40\nnormal_stress = 2000\nwall_mu = 0.2\n",
      0.0625},
     {"tide", "",
      "kind = \"shear\"\nnormal_stress = 2000\nnormal_stress_amplitude = 500\n"
@@ -40,20 +42,22 @@ const Kind kinds[] = {
      0.0625},
     {"automatic_dt", "[model]\ndt = \"auto\"\n", "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\n",
      0.125},
-    {"sides", "[box]\nperiodic = \"y\"\n", "kind = \"settle\"\n", 0.0625},
-    {"frictionless", "", "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nmu_s = 0\n", 0.0625},
+    {"sides", "[box]\nperiodic = \"y\"\n", "kind = \"settle\"\nwall_gamma_n = 40\nwall_gamma_t = 40\n",
+     0.0625},
+    {"frictionless", "", "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nmu_s = 0\nmu_d = 0\n", 0.0625},
     {"wet",
      "[fluid]\nenabled = true\nviscosity = 1.8e-3\ncompressibility = 1e-6\npermeability_factor = 1e-9\n",
      "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nmu_s = 0.6\nmu_d = 0.3\n", 0.0625},
     {"wet_tide",
      "[fluid]\nenabled = true\nviscosity = 1.8e-3\ncompressibility = 1e-6\npermeability_factor = 1e-9\n",
-     "kind = \"consolidate\"\nnormal_stress = 2000\ntop_pressure = 100\ntop_pressure_amplitude = 300\n"
+     "kind = \"consolidate\"\nwall_gamma_n = 40\nwall_gamma_t = 40\nnormal_stress = 2000\ntop_pressure = "
+     "100\ntop_pressure_amplitude = 300\n"
      "top_pressure_frequency = 5\n",
      0.0625},
     {"undrained", "[fluid]\nenabled = true\ncompressibility = 1e-6\nexchange_interval = 1\n",
      "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nfluid_top = \"impermeable\"\n", 0.0625},
-    {"wet_settle", "[fluid]\nenabled = true\ncompressibility = 1e-6\nheight = 0.5\n", "kind = \"settle\"\n",
-     0.0625},
+    {"wet_settle", "[fluid]\nenabled = true\ncompressibility = 1e-6\nheight = 0.5\n",
+     "kind = \"settle\"\nwall_gamma_n = 40\nwall_gamma_t = 40\n", 0.0625},
 };
 
 class Seams : public Program, public testing::WithParamInterface<Kind> {
