@@ -82,6 +82,51 @@ TEST_P(TwoGrains, HeadOnDamped) {
     }
 }
 
+// A grain is drawn over one that is held, and slips: mu_d = 0.3. It does so where a stage begins, too, and
+// does not climb to mu_s = 0.6 again; also where the stage before had but one friction and did not need to
+// know.
+TEST_P(TwoGrains, WhatSlipsGoesOnSlippingWhereAStageBegins) {
+  const auto engine = make();
+  for (const double mu_before : {0.6, 0.3}) {
+    Scene s = empty_space(k);
+    s.grain.mu_s = mu_before, s.grain.mu_d = 0.3;
+    s.shear = {Shear::Drive::velocity, 0.01, 0, false};
+    s.dt = 0.05 * std::sqrt(mass(s, r1) / k);
+    // Floor, grain, grain, wall: at each contact the same overlap.
+    const double overlap = 1e-3 * r1;
+    s.floor = true, s.wall.mu_s = s.wall.mu_d = 0;
+    s.top_wall = {.drive = TopWall::Drive::stress, .mass = mass(s, r1), .sigma_0 = k * overlap / s.area()};
+    State grains = grains_at_rest({r1, r1}, {{0, 0, r1 - overlap}, {0, 0, 3 * r1 - 2 * overlap}});
+    grains.role = {Role::bottom, Role::top};
+    grains.wall_z = 4 * r1 - 3 * overlap;
+    const auto friction = [&](const State& now) { return -now.shear_force / (k * overlap); };
+    // To slip takes a way of mu_s overlap.
+    const auto steps = static_cast<std::int64_t>(1.5 * 0.6 * overlap / (0.01 * s.dt));
+    State before = run(*engine, s, grains, steps);
+    ASSERT_NEAR(friction(before), 0.3,
+                0.003);  // the normal leans by 9e-6 m in 2e-2 m
+    if (s.grain.mu_s == s.grain.mu_d) mark_slipping(s, before);
+    synchronise(s, before);
+    s.grain.mu_s = 0.6;
+    double most = 0;
+    engine->load(s, before);
+    for (std::int64_t n = 0; n < steps; ++n) {
+      engine->advance(1);
+      most = std::max(most, friction(engine->state()));
+    }
+    EXPECT_NEAR(most, 0.3, 0.003) << mu_before;
+    // What rests has the static friction to lose.
+    grains.v.assign(2, {0, 0, 0});
+    most = 0;
+    engine->load(s, grains);
+    for (std::int64_t n = 0; n < steps; ++n) {
+      engine->advance(1);
+      most = std::max(most, friction(engine->state()));
+    }
+    EXPECT_NEAR(most, 0.6, 0.02);  // a step is 0.017 of the way
+  }
+}
+
 ON_EVERY_BACKEND(TwoGrains);
 
 // A pair with a strained tangential spring, carried round once as one rigid body, about four axes in the four

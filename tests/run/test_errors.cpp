@@ -22,15 +22,15 @@ class Errors : public Program {
 TEST_F(Errors, UnknownKey) {
   expect_error_in(
       "columns_y", "colums_y",
-      {"bad/case.toml:5", "grains.colums_y = 6", "unknown key", "did you mean grains.columns_y?"});
-  expect_error_in("mu_s", "mu", {"bad/case.toml:10", "contact.mu = 0.5", "unknown key"});
+      {"bad/case.toml:5", "grains.colums_y = 5", "unknown key", "did you mean grains.columns_y?"});
+  expect_error_in("mu_s", "mu", {"bad/case.toml:11", "contact.mu = 0.5", "unknown key"});
 }
 
 TEST_F(Errors, WrongType) {
   expect_error_in("seed = 3", "seed = \"three\"",
-                  {"bad/case.toml:6", "grains.seed", "\"three\"", "expected an integer"});
+                  {"bad/case.toml:7", "grains.seed", "\"three\"", "expected an integer"});
   expect_error_in("mu_s = 0.5", "mu_s = true",
-                  {"bad/case.toml:10", "contact.mu_s = true", "expected a number"});
+                  {"bad/case.toml:11", "contact.mu_s = true", "expected a number"});
 }
 
 TEST_F(Errors, WrongDimension) {
@@ -46,7 +46,7 @@ TEST_F(Errors, WrongChoice) {
 
 TEST_F(Errors, NegativeRadius) {
   expect_error_in("seed = 3", "radius_mean = -0.02",
-                  {"bad/case.toml:6", "grains.radius_mean = -0.02", "expected > 0 m"});
+                  {"bad/case.toml:7", "grains.radius_mean = -0.02", "expected > 0 m"});
 }
 
 TEST_F(Errors, NoToml) { expect_error_in("[grains]", "[grains", {"bad/case.toml:2"}); }
@@ -65,7 +65,7 @@ TEST_F(Errors, SetOnTheCommandLine) {
 }
 
 TEST_F(Errors, GrainsOverlapAtTheStart) {
-  expect_error_in("seed = 3", "cell = 0.9", {"bad/case.toml:6", "grains.cell = 0.9", "expected >= 1.05"});
+  expect_error_in("cell = 1.3", "cell = 0.9", {"bad/case.toml:6", "grains.cell = 0.9", "expected >= 1.05"});
   const fs::path small = make("small", small_case());
   expect_error(to_run(small, {"box.x=0.1"}), {"overlap at the start", "grains.columns_x", "grains.cell"});
 }

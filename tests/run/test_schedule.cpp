@@ -30,7 +30,7 @@ class Schedule : public Program {
 // last two of a stage stand a few steps apart.
 TEST_F(Schedule, RecordsAtTimes) {
   const auto fixed = make("fixed", small_case());
-  ASSERT_NO_FATAL_FAILURE(run(fixed, {"model.dt=1.37e-4", "guards.max_overlap=2"}));  // held layers meet
+  ASSERT_NO_FATAL_FAILURE(run(fixed, {"model.dt=1.37e-4"}));
   expect_times(fixed, 0.5 * 1.37e-4 * 1.001);
 }
 

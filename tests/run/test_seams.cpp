@@ -44,7 +44,8 @@ const Kind kinds[] = {
      0.125},
     {"sides", "[box]\nperiodic = \"y\"\n", "kind = \"settle\"\nwall_gamma_n = 40\nwall_gamma_t = 40\n",
      0.0625},
-    {"frictionless", "", "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nmu_s = 0\nmu_d = 0\n", 0.0625},
+    {"frictionless", "", "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nmu_s = 0\nmu_d = 0\n",
+     0.0625},
     {"wet",
      "[fluid]\nenabled = true\nviscosity = 1.8e-3\ncompressibility = 1e-6\npermeability_factor = 1e-9\n",
      "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nmu_s = 0.6\nmu_d = 0.3\n", 0.0625},
@@ -62,10 +63,18 @@ const Kind kinds[] = {
 
 class Seams : public Program, public testing::WithParamInterface<Kind> {
  protected:
-  static std::string bed_case() { return "stages = [\"settle\", \"consolidate\"]\n" + small_case(); }
+  // One bed for all.
+  static void SetUpTestSuite() { bed_ = new TemporaryDirectory; }
+  static void TearDownTestSuite() { delete bed_, bed_ = nullptr; }
+  void SetUp() override {
+    if (fs::exists(bed_->path() / "bed")) return;
+    const auto text = "stages = [\"settle\", \"consolidate\"]\n" + small_case();
+    run(bed_->write("bed/case.toml", text).parent_path());
+  }
+  static std::string bed() { return (bed_->path() / "bed").string(); }
 
   static std::string head() {
-    return "extends = \"../bed\"\n[output]\nseries_interval = 0.015625\nsnapshot_interval = 1\n";
+    return "extends = \"" + bed() + "\"\n[output]\nseries_interval = 0.015625\nsnapshot_interval = 1\n";
   }
   std::string stage(const std::string& name, double duration, const std::string& more = {}) const {
     return "[[stage]]\nname = \"" + name + "\"\nduration = " + std::to_string(duration) + "\n" +
@@ -80,20 +89,22 @@ class Seams : public Program, public testing::WithParamInterface<Kind> {
     return contents(directory.path() / "aside.h5");
   }
   std::vector<output::Row> rows(const fs::path& run) const { return output::read_series(series_of(run)); }
+
+ private:
+  static inline TemporaryDirectory* bed_ = nullptr;
 };
 
 TEST_P(Seams, ACutStageEndsWithTheBitsOfTheUncutOne) {
   const Kind& kind = GetParam();
-  ASSERT_NO_FATAL_FAILURE(run(make("bed", bed_case())));
   const auto text = [&](const std::string& start, const std::string& stages, const std::string& named) {
-    return "start = \"../" + start + "\"\nstages = [" + named + "]\n" + head() + kind.keys + stages;
+    return "start = \"" + start + "\"\nstages = [" + named + "]\n" + head() + kind.keys + stages;
   };
-  const fs::path whole = make("whole", text("bed", stage("one", 2 * kind.half), "\"one\""));
+  const fs::path whole = make("whole", text(bed(), stage("one", 2 * kind.half), "\"one\""));
   const fs::path cut =
-      make("cut", text("bed", stage("one", kind.half) + stage("two", kind.half), "\"one\", \"two\""));
-  const fs::path half = make("half", text("bed", stage("one", kind.half), "\"one\""));
+      make("cut", text(bed(), stage("one", kind.half) + stage("two", kind.half), "\"one\", \"two\""));
+  const fs::path half = make("half", text(bed(), stage("one", kind.half), "\"one\""));
   const fs::path rest =
-      make("rest", text("half", stage("two", kind.half, "zero_kinematics = false\n"), "\"two\""));
+      make("rest", text("../half", stage("two", kind.half, "zero_kinematics = false\n"), "\"two\""));
   for (const fs::path& one : {whole, cut, half, rest}) ASSERT_NO_FATAL_FAILURE(run(one));
   EXPECT_NE(contents(cut / "output/log.txt").find("goes on as the one before"), std::string::npos);
   EXPECT_TRUE(end_of(whole) == end_of(cut)) << "two stages of one case";

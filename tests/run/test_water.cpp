@@ -215,9 +215,9 @@ TEST_F(Program, RefusesWaterThatIsNotBuilt) {
 // once.
 TEST(WaterSchedule, EventsAreExchanges) {
   for (const std::int64_t m : {1, 2, 7, 64}) {
-    run::Stage stage;
+    run::Stage stage{};
     stage.scene.dt = 1.37e-4, stage.scene.exchange_interval = m;
-    stage.duration = 0.2, stage.series_interval = 0.01, stage.snapshot_interval = 0.05;
+    stage.end = 0.2, stage.series_interval = 0.01, stage.snapshot_interval = 0.05;
     const double span = static_cast<double>(m) * stage.scene.dt;
     std::int64_t step = 0;
     int series = 0, snapshots = 0;
