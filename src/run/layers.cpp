@@ -66,7 +66,7 @@ std::string remedy(const Layers& l, const dem::State& s, double height, double t
 std::vector<std::string> warnings_of(const cases::Stage& stage, const Layers& l, const dem::State& s,
                                      double height, const std::string& bed, double thinner) {
   const double between = height - l.bottom - l.top, d = mean_diameter(s);
-  if (between >= least_between * d) return {};
+  if (between >= (1 - 1e-9) * least_between * d) return {};
   return {text("stage ", stage.name, ": ", l.words, " leave ", brief(std::max(between, 0.0)), " m, ",
                brief(std::max(between, 0.0) / d), " mean diameters, of ", bed,
                " to deform, and driven grains may meet held ones", remedy(l, s, height, thinner))};

@@ -83,44 +83,7 @@ class Program : public testing::Test {
   // Some hundred grains, in three chunks of memory, that settle, are consolidated and sheared: soft and fast,
   // so that it takes a fraction of a second.
   static std::string small_case() {
-    return R"(
-[grains]
-count = 300
-columns_x = 5
-columns_y = 5
-cell = 1.3
-seed = 3
-[contact]
-k_n = "2e5 N/m"
-k_t = "2e5 N/m"
-mu_s = 0.5
-[model]
-f = 0.2
-[[stage]]
-name = "settle"
-kind = "settle"
-duration = "0.6 s"
-gamma_n = 10
-wall_gamma_n = 40
-wall_gamma_t = 40
-[[stage]]
-name = "consolidate"
-kind = "consolidate"
-normal_stress = "2 kPa"
-duration = "0.2 s"
-wall_gamma_n = 40
-wall_gamma_t = 40
-[[stage]]
-name = "shear"
-kind = "shear"
-normal_stress = "2 kPa"
-strain_rate = "1 1/s"
-strain = 0.2
-[output]
-series_interval = "0.01 s"
-snapshot_interval = "0.1 s"
-checkpoint_interval = "0.02 s"
-)";
+    return contents(fs::path(MORAINE_SOURCE_DIR) / "tests/run/small-bed/case.toml");
   }
 
   // A directory with that case.toml.
