@@ -181,6 +181,40 @@ bool asks_for_other_layers(const cases::Case& c, std::size_t index) {
   return stage.bottom_layer != before.bottom_layer || stage.top_layer != before.top_layer;
 }
 
+// What the stage does not want to know of the one before.
+void forget(const cases::Stage& stage, dem::State& s) {
+  if (stage.zero_kinematics) {
+    for (auto* v : {&s.v, &s.omega, &s.rotation}) std::fill(v->begin(), v->end(), dem::Vec3d{0, 0, 0});
+    s.wall_v = s.layer_u = 0;
+  }
+  if (stage.clear_history) {
+    for (dem::Contact& contact : s.contacts) contact.delta_t = {0, 0, 0}, contact.slipping = 0;
+    for (dem::WallContact& w : s.wall_contacts) w.delta_t = {0, 0, 0}, w.slipping = 0;
+  }
+}
+
+// Roles of the grains, and what displacement, strain and dilation are counted from; returns warnings.
+std::vector<std::string> set_reference(const cases::Case& c, std::size_t index, output::Checkpoint& now) {
+  const cases::Stage& stage = c.stages[index];
+  dem::State& s = now.state;
+  std::vector<std::string> warnings;
+  if (shears(stage.kind) && now.scene.shear.drive != dem::Shear::Drive::none) {
+    if (asks_for_other_layers(c, index))
+      warnings = {"stage " + stage.name +
+                  ": bottom_layer and top_layer do not count: the layers are those of the shear before it"};
+    return warnings;
+  }
+  if (shears(stage.kind)) {
+    warnings = choose_layers(stage, s);
+  } else {
+    std::fill(s.role.begin(), s.role.end(), dem::Role::free);
+    s.layer_u = 0;
+  }
+  s.x_start = s.x;
+  now.height_0 = s.wall_z > 0 ? s.wall_z : bed_top(s);
+  return warnings;
+}
+
 }  // namespace
 
 std::unique_ptr<coupling::PoreWater> fill(Stage& stage, const dem::State& grains,
@@ -221,33 +255,12 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, outpu
   }
   if (s.staggered && now.scene.grain.mu_d == now.scene.grain.mu_s) dem::mark_slipping(now.scene, s);
   dem::synchronise(now.scene, s);
-  if (stage.zero_kinematics) {
-    for (auto* v : {&s.v, &s.omega, &s.rotation}) std::fill(v->begin(), v->end(), dem::Vec3d{0, 0, 0});
-    s.wall_v = s.layer_u = 0;
-  }
-  if (stage.clear_history) {
-    for (dem::Contact& contact : s.contacts) contact.delta_t = {0, 0, 0}, contact.slipping = 0;
-    for (dem::WallContact& w : s.wall_contacts) w.delta_t = {0, 0, 0}, w.slipping = 0;
-  }
+  forget(stage, s);
   if (top_wall_of(c, stage, start, 0).drive == dem::TopWall::Drive::none)
     s.wall_z = 0;
   else if (s.wall_z <= 0)
     s.wall_z = bed_top(s);  // lowered onto the highest grain
-  const double height = s.wall_z > 0 ? s.wall_z : bed_top(s);
-  std::vector<std::string> warnings;
-  if (!shears(stage.kind)) {
-    std::fill(s.role.begin(), s.role.end(), dem::Role::free);
-    s.x_start = s.x;
-    s.layer_u = 0;
-    now.height_0 = height;
-  } else if (std::ranges::all_of(s.role, [](dem::Role r) { return r == dem::Role::free; })) {
-    warnings = choose_layers(stage, s);
-    s.x_start = s.x;  // displacement counts from here
-    now.height_0 = height;
-  } else if (asks_for_other_layers(c, index)) {
-    warnings = {"stage " + stage.name +
-                ": bottom_layer and top_layer do not count: the layers are those of the shear before it"};
-  }
+  const std::vector<std::string> warnings = set_reference(c, index, now);
   s.step = 0, s.staggered = false, s.ledger = {};
   s.water_force.clear(), s.water = {};
   dem::Scene scene = scene_of(c, stage, start, now.height_0);
