@@ -215,13 +215,18 @@ string text_of(const Draft& draft) {
   return text;
 }
 
-}  // namespace
-
-bool Case::has_water() const {
-  return std::any_of(stages.begin(), stages.end(), [](const Stage& s) { return s.fluid; });
+// Messages may quote what spans lines: a table of TOML, or toml++ itself.
+string one_line(const string& text) {
+  string line;
+  for (const char c : text)
+    if (static_cast<unsigned char>(c) > ' ')
+      line += c;
+    else if (!line.ends_with(' '))
+      line += ' ';
+  return line;
 }
 
-Case load(const fs::path& directory, const std::vector<Override>& overrides) {
+Case load_checked(const fs::path& directory, const std::vector<Override>& overrides) {
   Draft draft = read(directory, overrides);
   apply_preset(draft);
   const string file = (directory / "case.toml").string();
@@ -253,6 +258,20 @@ Case load(const fs::path& directory, const std::vector<Override>& overrides) {
   }
   c.resolved = text_of(draft);
   return c;
+}
+
+}  // namespace
+
+bool Case::has_water() const {
+  return std::any_of(stages.begin(), stages.end(), [](const Stage& s) { return s.fluid; });
+}
+
+Case load(const fs::path& directory, const std::vector<Override>& overrides) {
+  try {
+    return load_checked(directory, overrides);
+  } catch (const Error& e) {
+    throw Error(one_line(e.what()));
+  }
 }
 
 string extension_text(const fs::path& directory, const std::vector<Override>& overrides, const string& base) {

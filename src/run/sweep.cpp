@@ -50,7 +50,7 @@ class Sweep {
   Sweep(const Options& options, int at_once)
       : directory_(options.directory / "sweep"), screen_(options.quiet) {
     Plan plan = plan_sweep(options.overrides);
-    columns_ = std::move(plan.columns);
+    columns_ = std::move(plan.columns), understood_ = std::move(plan.understood);
     const bool gpu = options.backend == dem::Backend::cuda ||
                      (options.backend == dem::Backend::automatic && dem::cuda_device_present());
     const int count = static_cast<int>(plan.cases.size());
@@ -83,7 +83,7 @@ class Sweep {
 
   void run() {
     screen_.say(std::to_string(jobs_.size()) + " cases, " + std::to_string(at_once_) + " at once, in " +
-                directory_.string());
+                directory_.string() + ": " + understood_);
     std::vector<std::thread> workers;
     for (int k = 0; k < at_once_; ++k) workers.emplace_back([this] { work(); });
     watch();
@@ -204,6 +204,7 @@ class Sweep {
 
   fs::path directory_;
   std::vector<std::string> columns_;
+  std::string understood_;
   Screen screen_;
   int at_once_ = 1;
   std::deque<Job> jobs_;

@@ -47,8 +47,8 @@ TEST(SweepPlan, ValuesMayHaveUnitsOfTheirOwn) {
 
 TEST(SweepPlan, ListsGiveTheirProduct) {
   EXPECT_EQ(names(plan_sweep({{"grains.seed", "1,2"}, {"box.periodic", "x,xy"}})),
-            (std::vector<std::string>{"seed-1+periodic-x", "seed-1+periodic-xy", "seed-2+periodic-x",
-                                      "seed-2+periodic-xy"}));
+            (std::vector<std::string>{"periodic-x+seed-1", "periodic-xy+seed-1", "periodic-x+seed-2",
+                                      "periodic-xy+seed-2"}));
   EXPECT_EQ(names(plan_sweep({{"stage.a.mu_s", "1,2"}, {"stage.b.mu_s", "3,4"}}))[0], "a.mu_s-1+b.mu_s-3");
 }
 
@@ -69,6 +69,50 @@ TEST(SweepPlan, SaysWhatIsWrong) {
   EXPECT_NE(fault({{"seed", "1,,2"}}).find("--set seed=1,,2: a value of the list is empty"),
             std::string::npos);
   EXPECT_NE(fault({{"seed", "1,2,1"}}).find("seed-1; expected every value once"), std::string::npos);
+}
+
+// The order of the lists is that of the cases, not of the words in a name.
+TEST(SweepPlan, NamesDoNotDependOnTheOrderOfLists) {
+  const cases::Override seeds{"seed", "1,2"}, stresses{"normal_stress", "10,20 kPa"}, fixed{"model.f", "0.1"};
+  const auto sorted = [](const std::vector<cases::Override>& sets) {
+    auto list = names(plan_sweep(sets));
+    std::sort(list.begin(), list.end());
+    return list;
+  };
+  EXPECT_EQ(names(plan_sweep({stresses, seeds}))[1], "normal_stress-10kPa+seed-2");
+  EXPECT_EQ(sorted({stresses, seeds}), sorted({seeds, fixed, stresses}));
+  EXPECT_NE(names(plan_sweep({stresses, seeds})), names(plan_sweep({seeds, stresses})));
+}
+
+TEST(SweepPlan, AKeyIsSetOnce) {
+  for (const auto& sets : std::vector<std::vector<cases::Override>>{{{"seed", "1,2"}, {"seed", "3,4"}},
+                                                                    {{"seed", "5"}, {"seed", "1,2"}},
+                                                                    {{"seed", "1,2"}, {"seed", "5"}}})
+    EXPECT_NE(fault(sets).find(": expected each key once"), std::string::npos) << fault(sets);
+}
+
+// Each value is what it would be in case.toml: none with another's digits.
+TEST(SweepPlan, NumbersInLists) {
+  const auto set_to = [](const std::string& list) {
+    std::vector<std::string> values;
+    for (const auto& c : plan_sweep({{"normal_stress", list}}).cases) values.push_back(c.overrides[0].value);
+    return values;
+  };
+  using List = std::vector<std::string>;
+  EXPECT_EQ(set_to("12 500, 15 000 Pa"), (List{"12 500 Pa", "15 000 Pa"}));
+  EXPECT_EQ(set_to("12,500 Pa"), (List{"12 Pa", "500 Pa"}));
+  EXPECT_EQ(set_to("4.5e-10,1e-9 1/Pa"), (List{"4.5e-10 1/Pa", "1e-9 1/Pa"}));
+  EXPECT_EQ(set_to("1,2 N s/m"), (List{"1 N s/m", "2 N s/m"}));
+  EXPECT_EQ(set_to("1,2 m s-2"), (List{"1 m s-2", "2 m s-2"}));
+  EXPECT_EQ(set_to("1,2 10 kPa"), (List{"1 10 kPa", "2 10 kPa"}));  // refused where it is read
+  EXPECT_EQ(set_to("0.1,0.2 ms,auto"), (List{"0.1 ms", "0.2 ms", "auto"}));
+  EXPECT_EQ(names(plan_sweep({{"normal_stress", "12 500 Pa,"}})), List{"normal_stress-12500Pa"});
+  for (const char* parts_of_one : {"12,000 Pa", "1,160,000,000", "1,05 kPa", "10,00 kPa"})
+    EXPECT_NE(fault({{"k_n", parts_of_one}}).find("without a comma"), std::string::npos) << parts_of_one;
+  for (const char* some : {"10 kPa,20", "10 kPa, 20, 30", "10 kPa,20,auto"})
+    EXPECT_NE(fault({{"normal_stress", some}}).find("has a unit and"), std::string::npos) << some;
+  EXPECT_EQ(plan_sweep({{"normal_stress", "12,500 Pa"}, {"seed", "1,2"}}).understood,
+            "normal_stress = 12 Pa, 500 Pa; seed = 1, 2");
 }
 
 class Sweep : public Program {
