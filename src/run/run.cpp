@@ -9,6 +9,7 @@
 #include <iostream>
 
 #include "error.hpp"
+#include "memory.hpp"
 #include "output/files.hpp"
 #include "run/guard.hpp"
 #include "run/precheck.hpp"
@@ -69,12 +70,12 @@ class Runner {
     progress_ = std::make_unique<Progress>(files_.log(), resuming, options_.quiet);
     try {
       run_stages(resuming);
-    } catch (const Error& e) {
+    } catch (const std::exception& e) {
       const bool kept = fs::exists(files_.checkpoint());
       const std::string after =
           kept ? "; the last good checkpoint stays in " + files_.checkpoint().string() : "";
-      progress_->say(std::string("stopped: ") + e.what() + after);
-      throw error(e.what(), after);
+      progress_->say("stopped: " + in_words(e) + after);
+      throw error(in_words(e), after);
     }
     return {now_.rows, false};
   }

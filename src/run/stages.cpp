@@ -8,6 +8,7 @@
 #include "dem/packing.hpp"
 #include "error.hpp"
 #include "output/files.hpp"
+#include "run/needs.hpp"
 #include "run/schedule.hpp"
 
 namespace moraine::run {
@@ -97,6 +98,7 @@ Start start_of(const cases::Case& c) {
     if (s.wall_mass <= 0) s.wall_mass = default_wall_mass(c, s.state.size(), c.grains.cell * 2 * r_max);
     return s;
   }
+  expect_room(c);
   const cases::Grains& g = c.grains;
   dem::Packing p;
   p.count = g.count;

@@ -13,6 +13,7 @@
 
 #include "backend/team.hpp"
 #include "error.hpp"
+#include "memory.hpp"
 #include "run/progress.hpp"
 #include "run/record.hpp"
 #include "run/sweep_plan.hpp"
@@ -99,7 +100,7 @@ class Sweep {
       try {
         result = run_one(job->options, job->what);
       } catch (const std::exception& e) {
-        message = e.what();
+        message = in_words(e);
       }
       const std::lock_guard lock(mutex_);
       job->state = message.empty() ? State::finished : State::failed;
