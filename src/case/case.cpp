@@ -274,6 +274,31 @@ Case load(const fs::path& directory, const std::vector<Override>& overrides) {
   }
 }
 
+std::vector<Change> changes(const string& resolved_before, const Case& now) {
+  const auto before = read_resolved(resolved_before), after = read_resolved(now.resolved);
+  if (before.at("stages") != after.at("stages"))
+    return {{"stages", before.at("stages"), after.at("stages"), true}};
+  std::map<string, std::pair<string, string>> both;
+  for (const auto& [name, value] : before) both[name].first = value;
+  for (const auto& [name, value] : after) both[name].second = value;
+  std::vector<Change> found;
+  for (auto& [name, values] : both) {
+    if (values.first == values.second) continue;
+    const auto dot = name.rfind('.');
+    const Key* key = find(name.starts_with("stage.") ? "stage" + name.substr(dot) : name);
+    for (string* value : {&values.first, &values.second})
+      if (value->empty())
+        *value = "nothing";
+      else if (key && !key->unit.empty() && key->unit != "1")
+        *value += " " + key->unit;
+    using Decides = Key::Decides;
+    const Decides decides = key ? key->decides : Decides::physics;
+    found.push_back({name, values.first, values.second,
+                     decides == Decides::physics || (decides == Decides::records && now.automatic_dt)});
+  }
+  return found;
+}
+
 string extension_text(const fs::path& directory, const std::vector<Override>& overrides, const string& base) {
   Draft draft = read(directory, overrides);
   const auto keep_overrides = [](Entries& entries) {

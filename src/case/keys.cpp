@@ -70,6 +70,15 @@ Key row(string name, string unit, string fallback, string accepts, string meanin
   return {name, type_of<T>(accepts), unit, fallback, accepts, meaning, kinds, set<members...>};
 }
 
+Key no_physics(Key key) {
+  key.decides = Key::Decides::nothing;
+  return key;
+}
+Key records(Key key) {
+  key.decides = Key::Decides::records;
+  return key;
+}
+
 std::vector<Key> make_keys() {
   using C = Case;
   using G = Grains;
@@ -83,7 +92,7 @@ std::vector<Key> make_keys() {
   const string sheared = "shear, shear_stress", damped = "; settle, consolidate: ";
   return {
       // clang-format off
-      row<&C::title>("title", "", "\"\"", "", "what the case is about"),
+      no_physics(row<&C::title>("title", "", "\"\"", "", "what the case is about")),
       {"extends", Type::text, "", "\"\"", "", "directory of a case whose keys and stages this one takes over", "", nullptr},
       row<&C::start>("start", "", "\"\"", "", "where the grains come from: a finished case, or a checkpoint file; empty: a loose lattice"),
       {"stages", Type::list, "", "[]", "", "names of the stages to run, in order; empty: all", "", nullptr},
@@ -124,7 +133,7 @@ std::vector<Key> make_keys() {
       {"model.f", Type::number, "1", "0.075", "> 0", "time step in units of sqrt(min m / max(k_n, k_t)), eq. 9; a stage may have its own", "", set_nothing},
       {"model.dt", Type::number, "s", "0", ">= 0 | auto", "time step; 0: by f; \"auto\": safety times the critical step of the present contact network", "", set_dt},
       row<&C::safety>("model.safety", "1", "0.5", "0.01 .. 1", "dt = \"auto\": share of the critical step"),
-      row<&C::neighbour_margin>("model.neighbour_margin", "m", "0", ">= 0", "of the neighbour list; 0: automatic; changes no result"),
+      no_physics(row<&C::neighbour_margin>("model.neighbour_margin", "m", "0", ">= 0", "of the neighbour list; 0: automatic; changes no result")),
       row<&C::ledger>("model.ledger", "", "true", "", "account for every joule"),
 
       row<fluid, &F::enabled>("fluid.enabled", "", "false", "", "pore water in the stages; a stage may say otherwise"),
@@ -141,8 +150,8 @@ std::vector<Key> make_keys() {
       row<fluid, &F::height>("fluid.height", "m", "0", ">= 0", "of the grid where there is no top wall; 0: the bed and one cell"),
       row<fluid, &F::closure>("fluid.closure", "", "\"full\"", "full | pressure_gradient", "force on a grain: -V/(1 - phi) grad p, or -V grad p without the drag"),
       row<fluid, &F::exchange_interval>("fluid.exchange_interval", "", "0", ">= 0", "steps between exchanges of grains and water; 0: the longest that is stable"),
-      row<fluid, &F::solver>("fluid.solver", "", "\"automatic\"", "automatic | pcg | cholmod", "for the pressure"),
-      row<fluid, &F::tolerance>("fluid.tolerance", "1", "1e-10", "> 0", "of the residual over the right-hand side (pcg)"),
+      no_physics(row<fluid, &F::solver>("fluid.solver", "", "\"automatic\"", "automatic | pcg | cholmod", "for the pressure")),
+      no_physics(row<fluid, &F::tolerance>("fluid.tolerance", "1", "1e-10", "> 0", "of the residual over the right-hand side (pcg)")),
       row<fluid, &F::x_low, &FluidSide::kind>("fluid.x_low", "", "\"no_flow\"", "no_flow | pressure | flux", "the side x = 0, where x is not periodic: tight, at x_low_pressure, or with x_low_flux through it"),
       row<fluid, &F::x_low, &FluidSide::pressure>("fluid.x_low_pressure", "Pa", "0", "", "over hydrostatic, at that side"),
       row<fluid, &F::x_low, &FluidSide::flux>("fluid.x_low_flux", "m/s", "0", "", "Darcy velocity through that side, into the bed"),
@@ -191,13 +200,13 @@ std::vector<Key> make_keys() {
       row<&S::bottom_pressure>("stage.bottom_pressure", "Pa", "0", "", "over hydrostatic, at the floor"),
       row<&S::bottom_flux>("stage.bottom_flux", "m/s", "0", "", "Darcy velocity through the floor, upwards"),
 
-      row<output, &O::series_interval>("output.series_interval", "s", "0.05", "> 0", "of model time"),
-      row<output, &O::snapshot_interval>("output.snapshot_interval", "s", "0.5", "> 0", "of model time"),
-      row<output, &O::checkpoint_interval>("output.checkpoint_interval", "s", "60", "> 0", "of wall clock"),
+      records(row<output, &O::series_interval>("output.series_interval", "s", "0.05", "> 0", "of model time")),
+      records(row<output, &O::snapshot_interval>("output.snapshot_interval", "s", "0.5", "> 0", "of model time")),
+      no_physics(row<output, &O::checkpoint_interval>("output.checkpoint_interval", "s", "60", "> 0", "of wall clock")),
 
-      row<guards, &Guards::interval>("guards.interval", "", "20000", ">= 1", "steps between looks at the state; the engine itself looks for lost grains every 256"),
-      row<guards, &Guards::max_overlap>("guards.max_overlap", "1", "0.2", "> 0", "deepest overlap over the smaller radius; beyond it the run stops"),
-      row<guards, &Guards::max_residue>("guards.max_residue", "1", "0.1", "> 0", "energy created or lost over that stored and put in; beyond it the run stops"),
+      no_physics(row<guards, &Guards::interval>("guards.interval", "", "20000", ">= 1", "steps between looks at the state; the engine itself looks for lost grains every 256")),
+      no_physics(row<guards, &Guards::max_overlap>("guards.max_overlap", "1", "0.2", "> 0", "deepest overlap over the smaller radius; beyond it the run stops")),
+      no_physics(row<guards, &Guards::max_residue>("guards.max_residue", "1", "0.1", "> 0", "energy created or lost over that stored and put in; beyond it the run stops")),
       // clang-format on
   };
 }

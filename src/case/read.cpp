@@ -338,6 +338,27 @@ Draft read(const fs::path& directory, const std::vector<Override>& overrides) {
   return draft;
 }
 
+std::map<string, string> read_resolved(const string& text) {
+  std::map<string, string> values;
+  std::vector<string> stages;
+  const auto take = [&](const string& table, const toml::table& keys) {
+    for (const auto& [leaf, value] : keys)
+      if (!value.is_table() && !value.is_array_of_tables())
+        values[table + string(leaf.str())] = text_of(value);
+  };
+  const toml::table all = toml::parse(text);
+  take("", all);
+  for (const auto& [name, node] : all)
+    if (const toml::table* table = node.as_table()) take(string(name.str()) + ".", *table);
+  if (const toml::array* list = all["stage"].as_array())
+    for (const toml::node& stage : *list) {
+      stages.push_back((*stage.as_table())["name"].value_or(string()));
+      take("stage." + stages.back() + ".", *stage.as_table());
+    }
+  values["stages"] = join(stages, ", ");
+  return values;
+}
+
 Value parse_default(const Key& key, const string& toml) { return parse_bare(key, toml); }
 
 }  // namespace moraine::cases

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <cstdio>
 #include <iostream>
+#include <set>
 
 #include "error.hpp"
 #include "memory.hpp"
@@ -95,23 +96,48 @@ class Runner {
     expect_no_results(options_);
     if (!fs::exists(files_.checkpoint())) return false;  // cut off before its first checkpoint
     now_ = output::read_checkpoint(files_.checkpoint());
-    if (now_.case_text != case_.resolved)
-      throw error(files_.checkpoint().string(), ": belongs to another version of this case (see ",
-                  files_.resolved().string(), "); undo the change, or use --force to run anew");
+    take_changes();
     return true;
   }
 
-  void run_stages(bool resuming) {
-    if (!resuming) {
-      now_.case_text = case_.resolved;
-      now_.state = start_.state, now_.water = start_.water;
+  // What is no physics may be another since the checkpoint was written.
+  void take_changes() {
+    std::string refused;
+    for (const cases::Change& c : cases::changes(now_.case_text, case_)) {
+      const std::string words = c.key + " was " + c.before + " and is now " + c.now;
+      if (c.physics)
+        refused += (refused.empty() ? "" : "; ") + words;
+      else
+        changes_.push_back(words);
     }
+    if (!refused.empty())
+      throw error(files_.checkpoint().string(), ": belongs to another version of this case: ", refused,
+                  "; undo the change, or use --force to run anew");
+    now_.scene.neighbour_margin = case_.neighbour_margin;
+  }
+
+  // Snapshots later than the checkpoint are taken again, maybe at other times.
+  void remove_later_snapshots() {
+    std::set<std::string> kept;
+    for (const output::SnapshotInfo& s : now_.snapshots) kept.insert(s.file);
+    for (const auto& entry : fs::directory_iterator(files_.snapshots()))
+      if (entry.path().extension() == ".h5" && !kept.contains(entry.path().filename().string()))
+        fs::remove(entry.path());
+  }
+
+  void run_stages(bool resuming) {
+    now_.case_text = case_.resolved;
+    if (resuming)
+      remove_later_snapshots();
+    else
+      now_.state = start_.state, now_.water = start_.water;
     now_.version = MORAINE_VERSION;
     const std::string header = "# moraine " MORAINE_VERSION ", " + engine_->describe() + ", seed " +
                                std::to_string(case_.grains.seed) + "\n";
     output::write_text(files_.resolved(), header + case_.resolved);
     progress_->say((resuming ? "resumed: " : "") + case_.title + ": " + std::to_string(start_.state.size()) +
                    " grains, " + engine_->describe());
+    for (const std::string& c : changes_) progress_->say("changed: " + c);
     for (const std::string& w : warnings_) progress_->say("warning: " + w);
     series_ = std::make_unique<output::Series>(files_.series(), now_.rows, case_.has_water());
 
@@ -217,10 +243,14 @@ class Runner {
   }
 
   void snapshot(const Stage& stage) {
+    // By number within the stage; the interval may have changed on the way.
     char name[80];
-    std::snprintf(name, sizeof name, "%02d-%s-%06lld", static_cast<int>(now_.stage) + 1, stage.name.c_str(),
-                  static_cast<long long>(std::ceil(
-                      (stage.scene.time(now_.state.step) - 0.5 * stage.scene.dt) / stage.snapshot_interval)));
+    const int length =
+        std::snprintf(name, sizeof name, "%02d-%s-", static_cast<int>(now_.stage) + 1, stage.name.c_str());
+    const std::string beginning(name, static_cast<std::size_t>(length));
+    const auto number = std::count_if(now_.snapshots.begin(), now_.snapshots.end(),
+                                      [&](const auto& s) { return s.file.starts_with(beginning); });
+    std::snprintf(name, sizeof name, "%s%06lld", beginning.c_str(), static_cast<long long>(number));
     now_.snapshots.push_back(output::write_snapshot(files_.snapshots(), name, now_.rows.back().time,
                                                     stage.scene, now_.state,
                                                     water_ ? std::optional(water_->fields()) : std::nullopt));
@@ -248,7 +278,7 @@ class Runner {
   std::unique_ptr<coupling::PoreWater> water_;  // of the present stage
   std::unique_ptr<dem::Engine> engine_;
   std::unique_ptr<Progress> progress_;
-  std::vector<std::string> warnings_;
+  std::vector<std::string> warnings_, changes_;
   std::unique_ptr<output::Series> series_;
   std::chrono::steady_clock::time_point saved_ = std::chrono::steady_clock::now();
 };

@@ -14,6 +14,8 @@
 #include "backend/team.hpp"
 #include "error.hpp"
 #include "memory.hpp"
+#include "run/needs.hpp"
+#include "run/precheck.hpp"
 #include "run/progress.hpp"
 #include "run/record.hpp"
 #include "run/sweep_plan.hpp"
@@ -70,6 +72,11 @@ class Sweep {
       job.plan = std::move(planned);
       expect_no_results(job.options);
     }
+    const auto largest = std::max_element(jobs_.begin(), jobs_.end(), [](const Job& a, const Job& b) {
+      return a.what.grains.count < b.what.grains.count;
+    });
+    expect_room(largest->what, at_once_);
+    check_all();
     for (Job& job : jobs_) {
       std::error_code failed;
       fs::create_directories(job.options.directory, failed);
@@ -93,6 +100,27 @@ class Sweep {
   }
 
  private:
+  // What would be refused before its first step is refused before any case begins, and leaves nothing behind.
+  void check_all() {
+    std::vector<std::string> refused(jobs_.size());
+    std::atomic<std::size_t> next = 0;
+    const auto check = [&] {
+      for (std::size_t k; (k = next++) < jobs_.size();) {
+        const Job& job = jobs_[k];
+        try {
+          precheck(job.what, start_of(job.what), *dem::make_engine(job.options.backend, job.options.threads));
+        } catch (const std::exception& e) {
+          refused[k] = job.plan.name + ": " + in_words(e);
+        }
+      }
+    };
+    std::vector<std::thread> workers;
+    for (int k = 0; k < at_once_; ++k) workers.emplace_back(check);
+    for (std::thread& worker : workers) worker.join();
+    for (const std::string& message : refused)
+      if (!message.empty()) throw Error(message);
+  }
+
   void work() {
     while (Job* job = take()) {
       std::string message;

@@ -218,6 +218,12 @@ TEST_F(Sweep, SaysWhatIsWrongBeforeAnythingRuns) {
   expect_fault("normal_stres=1,2 kPa", {"--set normal_stres=1 kPa", "unknown key"});
   expect_fault("mu_s=0.3,0.4", {"contact.mu_s", "stage.mu_s"});
   expect_fault("seed=1,-1", {"--set seed=-1", "expected >= 0"});
+  // By what stands in case.toml, by its grains, by its stages, and by the machine.
+  expect_fault("normal_stress=1 kPa,12 50 Pa", {"understood the number 12 and the unit \"50 Pa\""});
+  expect_fault("box.x=0,0.1", {"x-0.1: the grains overlap at the start"});
+  expect_fault("stage.settle.wall_gamma_n=1,1e4",
+               {"wall_gamma_n-1e4: stage settle: wall_gamma_n = 10000", "unstable"});
+  expect_fault("count=100,2e9", {"grains.count = 2000000000", "GB", "expected at most"});
   EXPECT_FALSE(fs::exists(small / "sweep"));
 
   ASSERT_EQ(moraine(to_sweep(small, "seed=1,3")).status, 0);
