@@ -152,7 +152,8 @@ struct Change {
 };
 std::vector<Change> changes(const std::string& resolved_before, const Case& now);
 
-// The reference of all keys (name, unit, default, meaning), as `moraine keys` prints it.
-std::string reference();
+// The reference of all keys (name, unit, default, meaning), as `moraine keys` prints it; or of those that
+// have each of these words in their name or meaning. Throws Error where there are none.
+std::string reference(const std::vector<std::string>& words = {});
 
 }  // namespace moraine::cases

@@ -1,9 +1,9 @@
 #include "case/keys.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cstdio>
-#include <numeric>
 #include <type_traits>
 #include <utility>
 
@@ -211,20 +211,20 @@ std::vector<Key> make_keys() {
   };
 }
 
-// Levenshtein: insertions, deletions and substitutions from one word to the other.
+// Insertions, deletions, substitutions and swaps of neighbours from one word to the other.
 std::size_t edit_distance(const string& a, const string& b) {
-  std::vector<std::size_t> d(b.size() + 1);
-  std::iota(d.begin(), d.end(), 0);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = d[0];
-    d[0] = i + 1;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t substituted = diagonal + (a[i] != b[j]);
-      diagonal = d[j + 1];
-      d[j + 1] = std::min({substituted, d[j] + 1, d[j + 1] + 1});
+  std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
+  for (std::size_t i = 0; i <= a.size(); ++i)
+    for (std::size_t j = 0; j <= b.size(); ++j) {
+      if (i == 0 || j == 0) {
+        d[i][j] = i + j;
+        continue;
+      }
+      d[i][j] = std::min({d[i - 1][j - 1] + (a[i - 1] != b[j - 1]), d[i - 1][j] + 1, d[i][j - 1] + 1});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
     }
-  }
-  return d.back();
+  return d[a.size()][b.size()];
 }
 
 string leaf(const string& name) { return name.substr(name.find('.') + 1); }
@@ -235,6 +235,22 @@ bool in_range(const string& range, double value) {
   if (range.starts_with(">= ")) return value >= std::stod(range.substr(3));
   if (range.starts_with("> ")) return value > std::stod(range.substr(2));
   return true;
+}
+
+// Each of the words in its name or meaning; in whatever case, and with spaces for underscores.
+bool is_about(const Key& key, const std::vector<string>& words) {
+  const auto plain = [](string text) {
+    for (char& c : text) c = c == '_' ? ' ' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return text;
+  };
+  const string text = plain(key.name + " " + key.meaning);
+  // "stage.shear.mu_s", as it is set, is stage.mu_s in the table.
+  const auto as_key = [](const string& word) {
+    const auto first = word.find('.'), last = word.rfind('.');
+    return word.starts_with("stage.") ? word.substr(0, first) + word.substr(last) : word;
+  };
+  return std::all_of(words.begin(), words.end(),
+                     [&](const string& word) { return text.find(plain(as_key(word))) != text.npos; });
 }
 
 string quoted(const string& text) {
@@ -341,7 +357,7 @@ string to_toml(const Value& value) {
   return text.find_first_of(".en") == text.npos ? text + ".0" : text;
 }
 
-string reference() {
+string reference(const std::vector<string>& words) {
   const auto pad = [](string text, std::size_t width) {
     text.resize(std::max(text.size() + 1, width), ' ');
     return text;
@@ -349,18 +365,30 @@ string reference() {
   string out =
       "The keys of case.toml: name, default and unit, meaning, (what is accepted), [kinds of stage].\n"
       "A value is a number in SI units or a text with a unit, such as \"80 kPa\".\n";
-  string table;
+  string table = "none yet";
+  bool found = false, with_presets = words.empty();
   for (const Key& key : keys()) {
+    if (!is_about(key, words)) continue;
+    found = true, with_presets = with_presets || key.name == "model.preset";
     if (key.table() != table) {
       table = key.table();
-      const string name = table.substr(0, table.size() - 1);
-      out += table == "stage." ? "\n[[stage]]\n" : "\n[" + name + "]\n";
+      const string name = table.substr(0, table.find('.'));
+      if (!table.empty()) out += table == "stage." ? "\n[[stage]]\n" : "\n[" + name + "]\n";
     }
     out += "  " + pad(leaf(key.name), 25) + pad(key.fallback + (key.unit == "1" ? "" : " " + key.unit), 35) +
            key.meaning + (key.accepts.empty() ? "" : " (" + key.accepts + ")") +
            (key.kinds.empty() ? "" : " [" + key.kinds + "]") + "\n";
   }
-  return out + preset_reference();
+  if (found) return out + (with_presets ? preset_reference() : "");
+  std::vector<string> names;
+  for (const Key& key : keys()) {
+    names.push_back(leaf(key.name));
+    if (!key.table().empty()) names.push_back(split(key.name, ".")[0]);
+  }
+  const string near = nearest(words.back(), names);
+  throw error("keys ", join(words, " "), ": no key has ", words.size() > 1 ? "these words" : "this word",
+              " in its name or meaning; ", near.empty() ? "" : "did you mean " + near + "? ",
+              "`moraine keys` lists all");
 }
 
 }  // namespace moraine::cases

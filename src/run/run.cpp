@@ -45,6 +45,8 @@ void make_directories(const fs::path& path) {
   if (failed) throw error(path.string(), ": cannot be created: ", failed.message());
 }
 
+std::string in_words(const cases::Change& c) { return c.key + " was " + c.before + " and is now " + c.now; }
+
 std::string stability_of(const coupling::PoreWater& water, double dt) {
   const coupling::Stability s = water.stability();
   char text[160];
@@ -75,8 +77,8 @@ class Runner {
       const bool kept = fs::exists(files_.checkpoint());
       const std::string after =
           kept ? "; the last good checkpoint stays in " + files_.checkpoint().string() : "";
-      progress_->say("stopped: " + in_words(e) + after);
-      throw error(in_words(e), after);
+      progress_->say("stopped: " + moraine::in_words(e) + after);
+      throw error(moraine::in_words(e), after);
     }
     return {now_.rows, false};
   }
@@ -102,17 +104,11 @@ class Runner {
 
   // What is no physics may be another since the checkpoint was written.
   void take_changes() {
-    std::string refused;
-    for (const cases::Change& c : cases::changes(now_.case_text, case_)) {
-      const std::string words = c.key + " was " + c.before + " and is now " + c.now;
-      if (c.physics)
-        refused += (refused.empty() ? "" : "; ") + words;
-      else
-        changes_.push_back(words);
-    }
+    const std::string refused = changed_physics(now_.case_text, case_);
     if (!refused.empty())
       throw error(files_.checkpoint().string(), ": belongs to another version of this case: ", refused,
                   "; undo the change, or use --force to run anew");
+    for (const cases::Change& c : cases::changes(now_.case_text, case_)) changes_.push_back(in_words(c));
     now_.scene.neighbour_margin = case_.neighbour_margin;
   }
 
@@ -297,6 +293,13 @@ void expect_no_results(const Options& options) {
     throw error(files.output.string(),
                 ": holds the results of an earlier run; use --resume to go on from its checkpoint, or "
                 "--force to replace it");
+}
+
+std::string changed_physics(const std::string& resolved_before, const cases::Case& now) {
+  std::string words;
+  for (const cases::Change& c : cases::changes(resolved_before, now))
+    if (c.physics) words += (words.empty() ? "" : "; ") + in_words(c);
+  return words;
 }
 
 Result run_one(const Options& options, const cases::Case& c) { return Runner(options, c).run(); }

@@ -7,7 +7,9 @@
 #include <condition_variable>
 #include <cstdio>
 #include <deque>
+#include <fstream>
 #include <iostream>
+#include <iterator>
 #include <mutex>
 #include <thread>
 
@@ -77,16 +79,10 @@ class Sweep {
     });
     expect_room(largest->what, at_once_);
     check_all();
-    for (Job& job : jobs_) {
-      std::error_code failed;
-      fs::create_directories(job.options.directory, failed);
-      if (failed) throw error(job.options.directory.string(), ": cannot be created: ", failed.message());
-      output::write_text(job.options.directory / "case.toml",
-                         "# Written by `moraine sweep`.\n" +
-                             cases::extension_text(options.directory, job.plan.overrides, "../.."));
-      job.what = cases::load(job.options.directory);
-      for (std::size_t k = 0; k < job.what.stages.size(); ++k) job.work += expected_work(job.what, k);
-    }
+    // Those that go on first: they may be refused.
+    for (const bool begun : {true, false})
+      for (Job& job : jobs_)
+        if (fs::exists(job.options.directory / "output/case.toml") == begun) write_case(options, job);
   }
 
   void run() {
@@ -119,6 +115,28 @@ class Sweep {
     for (std::thread& worker : workers) worker.join();
     for (const std::string& message : refused)
       if (!message.empty()) throw Error(message);
+  }
+
+  void write_case(const Options& options, Job& job) {
+    const fs::path directory = job.options.directory, file = directory / "case.toml";
+    std::error_code failed;
+    fs::create_directories(directory, failed);
+    if (failed) throw error(directory.string(), ": cannot be created: ", failed.message());
+    const auto text_in = [](const fs::path& path) {
+      std::ifstream text(path);
+      return std::string(std::istreambuf_iterator<char>(text), {});
+    };
+    const std::string before = text_in(file), resolved_before = text_in(directory / "output/case.toml");
+    output::write_text(file, "# Written by `moraine sweep`.\n" +
+                                 cases::extension_text(options.directory, job.plan.overrides, "../.."));
+    job.what = cases::load(directory);
+    for (std::size_t k = 0; k < job.what.stages.size(); ++k) job.work += expected_work(job.what, k);
+    if (!options.resume || resolved_before.empty()) return;
+    if (const std::string changed = changed_physics(resolved_before, job.what); !changed.empty()) {
+      output::write_text(file, before);
+      throw error(directory.string(), ": holds results of another version of this case: ", changed,
+                  "; undo the change, or use --force to run anew");
+    }
   }
 
   void work() {

@@ -227,6 +227,19 @@ TEST_F(Sweep, SaysWhatIsWrongBeforeAnythingRuns) {
   EXPECT_FALSE(fs::exists(small / "sweep"));
 
   ASSERT_EQ(moraine(to_sweep(small, "seed=1,3")).status, 0);
+  const std::string written = contents(small / "sweep/seed-1/case.toml");
+  for (const char* seeds : {"seed=1,3", "seed=1,4"}) {
+    const Outcome o = moraine(to_sweep(small, seeds, {"--resume", "--set", "contact.mu_s=0.4"}));
+    EXPECT_EQ(o.status, 1);
+    EXPECT_NE(
+        o.err.find(
+            "sweep/seed-1: holds results of another version of this case: contact.mu_d was 0.5 and is now "
+            "0.4; contact.mu_s was 0.5 and is now 0.4"),
+        std::string::npos)
+        << o.err;
+    EXPECT_EQ(contents(small / "sweep/seed-1/case.toml"), written);
+    EXPECT_FALSE(fs::exists(small / "sweep/seed-4"));
+  }
   expect_fault("seed=1,2", {"sweep/seed-1/output", "--resume", "--force"});
   EXPECT_FALSE(fs::exists(small / "sweep/seed-2"));
 }
