@@ -2,6 +2,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
+#include <exception>
 #include <iostream>
 
 #include "case/case.hpp"
@@ -65,6 +67,15 @@ Error wrong_words(CLI::App& app, const std::string& first, const CLI::ParseError
 }  // namespace
 
 int main(int argc, char** argv) {
+  // What a thread of a team throws comes to no catch.
+  std::set_terminate([] {
+    try {
+      if (const auto thrown = std::current_exception()) std::rethrow_exception(thrown);
+    } catch (const std::exception& e) {
+      std::cerr << "moraine: " << in_words(e) << std::endl;
+    }
+    std::_Exit(1);
+  });
 #if defined(__AVX2__)
   if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) {
     std::fputs(
