@@ -1,17 +1,81 @@
 // moraine: grain-scale till mechanics. Each command reads a case directory; see README.md.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
+#include <cstdlib>
+#include <exception>
 #include <iostream>
 
 #include "case/case.hpp"
 #include "case/import_sphere.hpp"
+#include "case/keys.hpp"
 #include "error.hpp"
+#include "memory.hpp"
 #include "run/run.hpp"
 #include "run/sweep.hpp"
 
 using namespace moraine;
 
+namespace {
+
+constexpr const char* overview =
+#include "overview.inc"
+    +1;
+
+// Those of the script ./moraine, see there.
+const std::vector<std::string> launcher_commands = {"watch", "figures",   "report",
+                                                    "till",  "reproduce", "test"};
+
+std::string did_you_mean(const std::string& word, const std::vector<std::string>& known) {
+  std::string near = cases::nearest(word, known);
+  for (const std::string& k : known)
+    if (k.starts_with(word)) near = k;
+  return near.empty() ? "" : "; did you mean " + near + "?";
+}
+
+// What is wrong with the words typed; the parser's own words where it knows better.
+Error wrong_words(CLI::App& app, const std::string& first, const CLI::ParseError& e) {
+  const auto chosen = app.get_subcommands();
+  std::vector<std::string> commands = launcher_commands;
+  for (const CLI::App* command : app.get_subcommands(nullptr)) commands.push_back(command->get_name());
+  if (chosen.empty() && !first.starts_with('-')) {
+    const bool launchers = std::count(launcher_commands.begin(), launcher_commands.end(), first) > 0;
+    if (launchers)
+      return error(first, ": a command of the launcher, ./moraine ", first, ", in the folder of the sources");
+    const std::string near = did_you_mean(first, commands);
+    return error(first, ": unknown command", near.empty() ? "; known: " + cases::join(commands, ", ") : near);
+  }
+  CLI::App& where = chosen.empty() ? app : *chosen[0];
+  const std::string of = chosen.empty() ? "" : " of " + where.get_name();
+  const auto left = where.remaining();
+  for (const std::string& word : left) {
+    if (!word.starts_with('-')) continue;
+    std::vector<std::string> options;
+    if (chosen.empty()) options.push_back("--cuda");  // of the launcher
+    for (const CLI::Option* option : where.get_options())
+      for (const std::string& name : option->get_lnames()) options.push_back("--" + name);
+    const std::string near = did_you_mean(word, options);
+    return error(word, ": unknown option", of,
+                 near.empty() ? "; known: " + cases::join(options, ", ") : near);
+  }
+  if (!left.empty()) return error(left[0], ": one word too many for ", where.get_name());
+  std::string words = e.what();
+  while (words.ends_with('\n')) words.pop_back();
+  return error(words, "; see moraine ", chosen.empty() ? "" : where.get_name() + " ", "--help");
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
+  // What a thread of a team throws comes to no catch.
+  std::set_terminate([] {
+    try {
+      if (const auto thrown = std::current_exception()) std::rethrow_exception(thrown);
+    } catch (const std::exception& e) {
+      std::cerr << "moraine: " << in_words(e) << std::endl;
+    }
+    std::_Exit(1);
+  });
 #if defined(__AVX2__)
   if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) {
     std::fputs(
@@ -69,7 +133,9 @@ int main(int argc, char** argv) {
   CLI::App* check = app.add_subcommand("check", "check a case and print what would run");
   takes_case(check);
 
-  CLI::App* keys = app.add_subcommand("keys", "list all keys of case.toml");
+  CLI::App* keys = app.add_subcommand("keys", "list all keys of case.toml, or those about something");
+  std::vector<std::string> about;
+  keys->add_option("WORD", about, "what the key has in its name or meaning; of several words all");
 
   CLI::App* bench =
       app.add_subcommand("bench", "time some steps of a case without output; prints one line of JSON");
@@ -85,10 +151,18 @@ int main(int argc, char** argv) {
   import->add_option("FILE", file, "binary file, version 1.03 to 2.15")->required();
   import->add_option("CASE", directory, "directory to create")->required();
 
-  CLI11_PARSE(app, argc, argv);
-
   // 3. Do it, or say in one line why not.
+  if (argc == 1) {
+    std::cout << overview;
+    return 0;
+  }
   try {
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::ParseError& e) {
+      if (e.get_exit_code() == 0) return app.exit(e);  // --help, --version
+      throw wrong_words(app, argv[1], e);
+    }
     for (const std::string& set : sets) {
       const auto equals = set.find('=');
       if (equals == std::string::npos) throw error("--set ", set, ": expected KEY=VALUE");
@@ -100,11 +174,11 @@ int main(int argc, char** argv) {
     if (*run) run::run_case(options);
     if (*sweep) run::sweep_case(options, at_once);
     if (*check) run::check_case(options);
-    if (*keys) std::cout << cases::reference();
+    if (*keys) std::cout << cases::reference(about);
     if (*bench) run::bench_case(options, stage, steps);
     if (*import) cases::import_sphere(file, directory);
   } catch (const std::exception& e) {
-    std::cerr << "moraine: " << e.what() << "\n";
+    std::cerr << "moraine: " << in_words(e) << "\n";
     return 1;
   }
   return 0;

@@ -1,5 +1,6 @@
 """Commands on results: python3 -m moraine COMMAND, or ./moraine COMMAND. Each module named here has arguments(parser) and run(args)."""
 import argparse
+import difflib
 import importlib
 import sys
 
@@ -18,11 +19,19 @@ def main(words=None):
     parser = argparse.ArgumentParser(prog="moraine", description="Follows, measures and draws results.")
     parsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     words = sys.argv[1:] if words is None else words
+    options = []  # of the command
     for name, (module, what) in commands.items():
         sub = parsers.add_parser(name, help=what, description=what[0].upper() + what[1:] + ".")
         if name in words[:1]:
             importlib.import_module(f".{module}", __package__).arguments(sub)
-    args = parser.parse_args(words)
+            options = list(sub._option_string_actions)
+    args, left = parser.parse_known_args(words)
+    if left:
+        word = next((w for w in left if w.startswith("-")), left[0])
+        near = difflib.get_close_matches(word, options, 1)
+        print(f"moraine: {word}: {'unknown option of' if word.startswith('-') else 'one word too many for'} {args.command}; "
+              + (f"did you mean {near[0]}?" if near else f"see moraine {args.command} --help"), file=sys.stderr)
+        return 1
     try:
         return importlib.import_module(f".{commands[args.command][0]}", __package__).run(args) or 0
     except (MissingData, OSError) as why:  # the latter of what cannot be written

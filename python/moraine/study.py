@@ -19,7 +19,7 @@ stresses = "10,20,40,60,80,120 kPa"
 
 def stress_names(text):
     """"10,20 kPa" -> ["10kPa", "20kPa"], as `moraine sweep` names them."""
-    parts = [p.strip() for p in text.rstrip(", ").split(",")]
+    parts = [re.sub(r"(?<=\d) (?=\d{3}\b)", "", p.strip()) for p in text.rstrip(", ").split(",")]
     unit = re.sub(r"^[-+0-9.eE]+", "", parts[-1]).strip()
     return [re.sub(r"\s+", "", p) if re.search(r"[a-zA-Z]$", p) else p + unit for p in parts]
 

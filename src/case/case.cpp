@@ -216,13 +216,18 @@ string text_of(const Draft& draft) {
   return text;
 }
 
-}  // namespace
-
-bool Case::has_water() const {
-  return std::any_of(stages.begin(), stages.end(), [](const Stage& s) { return s.fluid; });
+// Messages may quote what spans lines: a table of TOML, or toml++ itself.
+string one_line(const string& text) {
+  string line;
+  for (const char c : text)
+    if (static_cast<unsigned char>(c) > ' ')
+      line += c;
+    else if (!line.ends_with(' '))
+      line += ' ';
+  return line;
 }
 
-Case load(const fs::path& directory, const std::vector<Override>& overrides) {
+Case load_checked(const fs::path& directory, const std::vector<Override>& overrides) {
   Draft draft = read(directory, overrides);
   apply_preset(draft);
   const string file = (directory / "case.toml").string();
@@ -256,6 +261,45 @@ Case load(const fs::path& directory, const std::vector<Override>& overrides) {
   }
   c.resolved = text_of(draft);
   return c;
+}
+
+}  // namespace
+
+bool Case::has_water() const {
+  return std::any_of(stages.begin(), stages.end(), [](const Stage& s) { return s.fluid; });
+}
+
+Case load(const fs::path& directory, const std::vector<Override>& overrides) {
+  try {
+    return load_checked(directory, overrides);
+  } catch (const Error& e) {
+    throw Error(one_line(e.what()));
+  }
+}
+
+std::vector<Change> changes(const string& resolved_before, const Case& now) {
+  const auto before = read_resolved(resolved_before), after = read_resolved(now.resolved);
+  if (before.at("stages") != after.at("stages"))
+    return {{"stages", before.at("stages"), after.at("stages"), true}};
+  std::map<string, std::pair<string, string>> both;
+  for (const auto& [name, value] : before) both[name].first = value;
+  for (const auto& [name, value] : after) both[name].second = value;
+  std::vector<Change> found;
+  for (auto& [name, values] : both) {
+    if (values.first == values.second) continue;
+    const auto dot = name.rfind('.');
+    const Key* key = find(name.starts_with("stage.") ? "stage" + name.substr(dot) : name);
+    for (string* value : {&values.first, &values.second})
+      if (value->empty())
+        *value = "nothing";
+      else if (key && !key->unit.empty() && key->unit != "1")
+        *value += " " + key->unit;
+    using Decides = Key::Decides;
+    const Decides decides = key ? key->decides : Decides::physics;
+    found.push_back({name, values.first, values.second,
+                     decides == Decides::physics || (decides == Decides::records && now.automatic_dt)});
+  }
+  return found;
 }
 
 string extension_text(const fs::path& directory, const std::vector<Override>& overrides, const string& base) {

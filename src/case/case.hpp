@@ -145,7 +145,15 @@ Case load(const std::filesystem::path& directory, const std::vector<Override>& o
 std::string extension_text(const std::filesystem::path& directory, const std::vector<Override>& overrides,
                            const std::string& base);
 
-// The reference of all keys (name, unit, default, meaning), as `moraine keys` prints it.
-std::string reference();
+// What differs between two resolved cases.
+struct Change {
+  std::string key, before, now;  // "stage.shear.normal_stress", "2000.0 Pa", "3000.0 Pa"
+  bool physics;                  // so that a run cannot go on with it
+};
+std::vector<Change> changes(const std::string& resolved_before, const Case& now);
+
+// The reference of all keys (name, unit, default, meaning), as `moraine keys` prints it; or of those that
+// have each of these words in their name or meaning. Throws Error where there are none.
+std::string reference(const std::vector<std::string>& words = {});
 
 }  // namespace moraine::cases

@@ -1,9 +1,9 @@
 #include "case/keys.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cstdio>
-#include <numeric>
 #include <type_traits>
 #include <utility>
 
@@ -70,6 +70,15 @@ Key row(string name, string unit, string fallback, string accepts, string meanin
   return {name, type_of<T>(accepts), unit, fallback, accepts, meaning, kinds, set<members...>};
 }
 
+Key no_physics(Key key) {
+  key.decides = Key::Decides::nothing;
+  return key;
+}
+Key records(Key key) {
+  key.decides = Key::Decides::records;
+  return key;
+}
+
 std::vector<Key> make_keys() {
   using C = Case;
   using G = Grains;
@@ -83,7 +92,7 @@ std::vector<Key> make_keys() {
   const string sheared = "shear, shear_stress", damped = "; settle, consolidate: ";
   return {
       // clang-format off
-      row<&C::title>("title", "", "\"\"", "", "what the case is about"),
+      no_physics(row<&C::title>("title", "", "\"\"", "", "what the case is about")),
       {"extends", Type::text, "", "\"\"", "", "directory of a case whose keys and stages this one takes over", "", nullptr},
       row<&C::start>("start", "", "\"\"", "", "where the grains come from: a finished case, or a checkpoint file; empty: a loose lattice"),
       {"stages", Type::list, "", "[]", "", "names of the stages to run, in order; empty: all", "", nullptr},
@@ -124,7 +133,7 @@ std::vector<Key> make_keys() {
       {"model.f", Type::number, "1", "0.075", "> 0", "time step in units of sqrt(min m / max(k_n, k_t)), eq. 9; a stage may have its own", "", set_nothing},
       {"model.dt", Type::number, "s", "0", ">= 0 | auto", "time step; 0: by f; \"auto\": safety times the critical step of the present contact network", "", set_dt},
       row<&C::safety>("model.safety", "1", "0.5", "0.01 .. 1", "dt = \"auto\": share of the critical step"),
-      row<&C::neighbour_margin>("model.neighbour_margin", "m", "0", ">= 0", "of the neighbour list; 0: automatic; changes no result"),
+      no_physics(row<&C::neighbour_margin>("model.neighbour_margin", "m", "0", ">= 0", "of the neighbour list; 0: automatic; changes no result")),
       row<&C::ledger>("model.ledger", "", "true", "", "account for every joule"),
 
       row<fluid, &F::enabled>("fluid.enabled", "", "false", "", "pore water in the stages; a stage may say otherwise"),
@@ -141,8 +150,8 @@ std::vector<Key> make_keys() {
       row<fluid, &F::height>("fluid.height", "m", "0", ">= 0", "of the grid where there is no top wall; 0: the bed and one cell"),
       row<fluid, &F::closure>("fluid.closure", "", "\"full\"", "full | pressure_gradient", "force on a grain: -V/(1 - phi) grad p, or -V grad p without the drag"),
       row<fluid, &F::exchange_interval>("fluid.exchange_interval", "", "0", ">= 0", "steps between exchanges of grains and water; 0: the longest that is stable"),
-      row<fluid, &F::solver>("fluid.solver", "", "\"automatic\"", "automatic | pcg | cholmod", "for the pressure"),
-      row<fluid, &F::tolerance>("fluid.tolerance", "1", "1e-10", "> 0", "of the residual over the right-hand side (pcg)"),
+      no_physics(row<fluid, &F::solver>("fluid.solver", "", "\"automatic\"", "automatic | pcg | cholmod", "for the pressure")),
+      no_physics(row<fluid, &F::tolerance>("fluid.tolerance", "1", "1e-10", "> 0", "of the residual over the right-hand side (pcg)")),
       row<fluid, &F::x_low, &FluidSide::kind>("fluid.x_low", "", "\"no_flow\"", "no_flow | pressure | flux", "the side x = 0, where x is not periodic: tight, at x_low_pressure, or with x_low_flux through it"),
       row<fluid, &F::x_low, &FluidSide::pressure>("fluid.x_low_pressure", "Pa", "0", "", "over hydrostatic, at that side"),
       row<fluid, &F::x_low, &FluidSide::flux>("fluid.x_low_flux", "m/s", "0", "", "Darcy velocity through that side, into the bed"),
@@ -191,31 +200,31 @@ std::vector<Key> make_keys() {
       row<&S::bottom_pressure>("stage.bottom_pressure", "Pa", "0", "", "over hydrostatic, at the floor"),
       row<&S::bottom_flux>("stage.bottom_flux", "m/s", "0", "", "Darcy velocity through the floor, upwards"),
 
-      row<output, &O::series_interval>("output.series_interval", "s", "0.05", "> 0", "of model time"),
-      row<output, &O::snapshot_interval>("output.snapshot_interval", "s", "0.5", "> 0", "of model time"),
-      row<output, &O::checkpoint_interval>("output.checkpoint_interval", "s", "60", "> 0", "of wall clock"),
+      records(row<output, &O::series_interval>("output.series_interval", "s", "0.05", "> 0", "of model time")),
+      records(row<output, &O::snapshot_interval>("output.snapshot_interval", "s", "0.5", "> 0", "of model time")),
+      no_physics(row<output, &O::checkpoint_interval>("output.checkpoint_interval", "s", "60", "> 0", "of wall clock")),
 
-      row<guards, &Guards::interval>("guards.interval", "", "20000", ">= 1", "steps between looks at the state; the engine itself looks for lost grains every 256"),
-      row<guards, &Guards::max_overlap>("guards.max_overlap", "1", "0.2", "> 0", "deepest overlap over the smaller radius; beyond it the run stops"),
-      row<guards, &Guards::max_residue>("guards.max_residue", "1", "0.1", "> 0", "energy created or lost over that stored and put in; beyond it the run stops"),
+      no_physics(row<guards, &Guards::interval>("guards.interval", "", "20000", ">= 1", "steps between looks at the state; the engine itself looks for lost grains every 256")),
+      no_physics(row<guards, &Guards::max_overlap>("guards.max_overlap", "1", "0.2", "> 0", "deepest overlap over the smaller radius; beyond it the run stops")),
+      no_physics(row<guards, &Guards::max_residue>("guards.max_residue", "1", "0.1", "> 0", "energy created or lost over that stored and put in; beyond it the run stops")),
       // clang-format on
   };
 }
 
-// Levenshtein: insertions, deletions and substitutions from one word to the other.
+// Insertions, deletions, substitutions and swaps of neighbours from one word to the other.
 std::size_t edit_distance(const string& a, const string& b) {
-  std::vector<std::size_t> d(b.size() + 1);
-  std::iota(d.begin(), d.end(), 0);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = d[0];
-    d[0] = i + 1;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t substituted = diagonal + (a[i] != b[j]);
-      diagonal = d[j + 1];
-      d[j + 1] = std::min({substituted, d[j] + 1, d[j + 1] + 1});
+  std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
+  for (std::size_t i = 0; i <= a.size(); ++i)
+    for (std::size_t j = 0; j <= b.size(); ++j) {
+      if (i == 0 || j == 0) {
+        d[i][j] = i + j;
+        continue;
+      }
+      d[i][j] = std::min({d[i - 1][j - 1] + (a[i - 1] != b[j - 1]), d[i - 1][j] + 1, d[i][j - 1] + 1});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
     }
-  }
-  return d.back();
+  return d[a.size()][b.size()];
 }
 
 string leaf(const string& name) { return name.substr(name.find('.') + 1); }
@@ -226,6 +235,22 @@ bool in_range(const string& range, double value) {
   if (range.starts_with(">= ")) return value >= std::stod(range.substr(3));
   if (range.starts_with("> ")) return value > std::stod(range.substr(2));
   return true;
+}
+
+// Each of the words in its name or meaning; in whatever case, and with spaces for underscores.
+bool is_about(const Key& key, const std::vector<string>& words) {
+  const auto plain = [](string text) {
+    for (char& c : text) c = c == '_' ? ' ' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return text;
+  };
+  const string text = plain(key.name + " " + key.meaning);
+  // "stage.shear.mu_s", as it is set, is stage.mu_s in the table.
+  const auto as_key = [](const string& word) {
+    const auto first = word.find('.'), last = word.rfind('.');
+    return word.starts_with("stage.") ? word.substr(0, first) + word.substr(last) : word;
+  };
+  return std::all_of(words.begin(), words.end(),
+                     [&](const string& word) { return text.find(plain(as_key(word))) != text.npos; });
 }
 
 string quoted(const string& text) {
@@ -332,7 +357,7 @@ string to_toml(const Value& value) {
   return text.find_first_of(".en") == text.npos ? text + ".0" : text;
 }
 
-string reference() {
+string reference(const std::vector<string>& words) {
   const auto pad = [](string text, std::size_t width) {
     text.resize(std::max(text.size() + 1, width), ' ');
     return text;
@@ -340,18 +365,30 @@ string reference() {
   string out =
       "The keys of case.toml: name, default and unit, meaning, (what is accepted), [kinds of stage].\n"
       "A value is a number in SI units or a text with a unit, such as \"80 kPa\".\n";
-  string table;
+  string table = "none yet";
+  bool found = false, with_presets = words.empty();
   for (const Key& key : keys()) {
+    if (!is_about(key, words)) continue;
+    found = true, with_presets = with_presets || key.name == "model.preset";
     if (key.table() != table) {
       table = key.table();
-      const string name = table.substr(0, table.size() - 1);
-      out += table == "stage." ? "\n[[stage]]\n" : "\n[" + name + "]\n";
+      const string name = table.substr(0, table.find('.'));
+      if (!table.empty()) out += table == "stage." ? "\n[[stage]]\n" : "\n[" + name + "]\n";
     }
     out += "  " + pad(leaf(key.name), 25) + pad(key.fallback + (key.unit == "1" ? "" : " " + key.unit), 35) +
            key.meaning + (key.accepts.empty() ? "" : " (" + key.accepts + ")") +
            (key.kinds.empty() ? "" : " [" + key.kinds + "]") + "\n";
   }
-  return out + preset_reference();
+  if (found) return out + (with_presets ? preset_reference() : "");
+  std::vector<string> names;
+  for (const Key& key : keys()) {
+    names.push_back(leaf(key.name));
+    if (!key.table().empty()) names.push_back(split(key.name, ".")[0]);
+  }
+  const string near = nearest(words.back(), names);
+  throw error("keys ", join(words, " "), ": no key has ", words.size() > 1 ? "these words" : "this word",
+              " in its name or meaning; ", near.empty() ? "" : "did you mean " + near + "? ",
+              "`moraine keys` lists all");
 }
 
 }  // namespace moraine::cases

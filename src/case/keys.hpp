@@ -25,6 +25,10 @@ struct Key {
   std::string meaning;
   std::string kinds;                                     // the kinds of stage it belongs to; empty: all
   void (*set)(const Key&, Case&, Stage&, const Value&);  // null: merging uses it up
+  // What it decides: a run may go on with another value of what is no physics. `records` are physics with
+  // model.dt = "auto", whose steps fit the times of records.
+  enum class Decides { physics, records, nothing };
+  Decides decides = Decides::physics;
 
   std::string table() const { return name.substr(0, name.find('.') + 1); }  // "contact.", or ""
 };

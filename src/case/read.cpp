@@ -93,9 +93,11 @@ Value checked(const Key& key, const toml::node& node) {
   return value;
 }
 
-// What a person types after --set: TOML, or a text without quotes.
+// What a person types after --set: TOML, or a text without quotes. What TOML takes for a comment is no part
+// of a value.
 Value parse_bare(const Key& key, const string& text) {
   const bool is_text = key.type == Type::text || key.type == Type::choice || key.type == Type::path;
+  if (!is_text && text.find('#') != text.npos) return checked(key, toml::value<string>(text));
   try {
     const toml::table t = toml::parse("v = " + text);
     const toml::node* node = t.get("v");
@@ -317,16 +319,44 @@ void set(Draft& draft, const string& full_name, const Override& o) {
 
 Draft read(const fs::path& directory, const std::vector<Override>& overrides) {
   Draft draft = read_file(directory, directory, {});
-  const auto set_all = [&](bool of_stages) {
+  // In whatever order they are given: what names a stage goes before what is meant for each.
+  const auto set_all = [&](bool of_stages, bool of_each) {
+    std::map<string, const Override*> by;
     for (const Override& o : overrides)
-      for (const string& name : full_names(draft, o))
-        if (name.starts_with("stage.") == of_stages) set(draft, name, o);
+      for (const string& name : full_names(draft, o)) {
+        const bool stage_key = name.starts_with("stage.");
+        if (stage_key != of_stages || (stage_key && o.key.find('.') == o.key.npos) != of_each) continue;
+        if (const auto [same, is_new] = by.insert({name, &o}); !is_new)
+          throw error(stated_as(*same->second), " and ", stated_as(o), ": expected each key once");
+        set(draft, name, o);
+      }
   };
   // `stages` first: a stage that does not run is none to set keys of.
-  set_all(false);
+  set_all(false, false);
   select_stages(draft);
-  set_all(true);
+  set_all(true, true), set_all(true, false);
   return draft;
+}
+
+std::map<string, string> read_resolved(const string& text) {
+  std::map<string, string> values;
+  std::vector<string> stages;
+  const auto take = [&](const string& table, const toml::table& keys) {
+    for (const auto& [leaf, value] : keys)
+      if (!value.is_table() && !value.is_array_of_tables())
+        values[table + string(leaf.str())] = text_of(value);
+  };
+  const toml::table all = toml::parse(text);
+  take("", all);
+  for (const auto& [name, node] : all)
+    if (const toml::table* table = node.as_table()) take(string(name.str()) + ".", *table);
+  if (const toml::array* list = all["stage"].as_array())
+    for (const toml::node& stage : *list) {
+      stages.push_back((*stage.as_table())["name"].value_or(string()));
+      take("stage." + stages.back() + ".", *stage.as_table());
+    }
+  values["stages"] = join(stages, ", ");
+  return values;
 }
 
 Value parse_default(const Key& key, const string& toml) { return parse_bare(key, toml); }

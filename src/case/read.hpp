@@ -31,6 +31,9 @@ struct Draft {
 // Throws Error, see case.hpp.
 Draft read(const std::filesystem::path& directory, const std::vector<Override>& overrides);
 
+// All keys of a resolved case, by full name ("stage.shear.f"), as they stand there, and its "stages".
+std::map<std::string, std::string> read_resolved(const std::string& text);
+
 // The value of a default written in the table of keys.
 Value parse_default(const Key& key, const std::string& toml);
 

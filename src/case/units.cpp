@@ -2,11 +2,14 @@
 
 #include <udunits2.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <memory>
 
+#include "case/quantity.hpp"
 #include "error.hpp"
 
 namespace moraine::cases {
@@ -45,33 +48,88 @@ Owned<ut_unit> parse_unit(const std::string& text) {
   return Owned<ut_unit>(ut_parse(unit_system(), text.c_str(), UT_UTF8));
 }
 
-std::string trimmed(const std::string& text) {
-  const auto begin = text.find_first_not_of(" \t");
-  return begin == text.npos ? "" : text.substr(begin, text.find_last_not_of(" \t") - begin + 1);
+// Powers of metre, second, ... and of the radian, which counts as one of them: an angle is no friction, and
+// 1 rad/s is not 1 Hz. Not ut_are_convertible(): that takes radians for 1, and a period for a frequency.
+struct Dimension {
+  std::map<std::string, int> powers;
+  bool proportional = true;  // no degrees Celsius, decibels or dates
+  bool operator==(const Dimension&) const = default;
+};
+
+Dimension dimension_of(const ut_unit* unit) {
+  const ut_visitor visitor = {
+      [](const ut_unit* basic, void* out) {
+        static_cast<Dimension*>(out)->powers[ut_get_name(basic, UT_ASCII)] = 1;
+        return UT_SUCCESS;
+      },
+      [](const ut_unit*, int count, const ut_unit* const* basics, const int* powers, void* out) {
+        for (int k = 0; k < count; ++k)
+          static_cast<Dimension*>(out)->powers[ut_get_name(basics[k], UT_ASCII)] = powers[k];
+        return UT_SUCCESS;
+      },
+      [](const ut_unit*, double, const ut_unit* underlying, double offset, void* out) {
+        *static_cast<Dimension*>(out) = dimension_of(underlying);
+        if (offset != 0) static_cast<Dimension*>(out)->proportional = false;
+        return UT_SUCCESS;
+      },
+      [](const ut_unit*, const ut_unit*, double, void* out) {
+        static_cast<Dimension*>(out)->proportional = false;
+        return UT_SUCCESS;
+      },
+      [](const ut_unit*, double, const ut_unit*, void* out) {
+        static_cast<Dimension*>(out)->proportional = false;
+        return UT_SUCCESS;
+      }};
+  Dimension dimension;
+  ut_accept_visitor(unit, &visitor, &dimension);
+  return dimension;
+}
+
+// Throws where a name is none of a unit, or one that scales others: "kPa %" would be 10 Pa.
+void check_names(const UnitExpression& unit, const std::string& expected) {
+  const auto& factors = unit.factors;
+  for (std::size_t k = 0; k < factors.size(); ++k) {
+    const auto known = parse_unit(factors[k].name);
+    if (!known) throw error("\"", factors[k].name, "\" is no unit", expected);
+    const Dimension d = dimension_of(known.get());
+    if (!d.proportional)
+      throw error("\"", factors[k].name, "\" counts from an origin or by logarithms", expected);
+    const bool above_others =
+        k == 0 && factors[0].power == 1 &&
+        std::all_of(factors.begin() + 1, factors.end(), [](const auto& other) { return other.power < 0; });
+    if (d.powers.empty() && !above_others)
+      throw error("\"", factors[k].name,
+                  "\" is a number, which may only stand alone or above a bar, as in %/s", expected);
+  }
 }
 
 }  // namespace
 
 double to_si(const std::string& text, const std::string& si_unit) {
-  const std::string quantity = trimmed(text);
-  double number = 0;
-  const char* end = quantity.data() + quantity.size();
-  const auto [after, fault] = std::from_chars(quantity.data() + quantity.starts_with('+'), end, number);
+  const auto [digits, name] = split_quantity(text);
   const bool plain = si_unit == "1";
-  if (fault != std::errc())
-    throw error("expected a number", plain ? "" : " and a unit, as in \"1 " + si_unit + "\"");
+  const std::string example = plain ? "" : " and a unit, as in \"1 " + si_unit + "\"";
+  if (digits.empty()) throw error("expected a number", example);
+  double number = 0;
+  if (std::from_chars(digits.data(), digits.data() + digits.size(), number).ec != std::errc())
+    throw error(digits, " is too large or too small a number");
+  if (name.empty() && plain) return number;
+  const std::string convertible = " convertible to " + si_unit;
+  if (name.empty()) throw error("expected a unit", convertible, " after the number");
 
-  std::string name = trimmed({after, end});
-  if (name.empty() && !plain) throw error("expected a unit convertible to ", si_unit, " after the number");
-  if (name.empty() || name.front() == '/') name = "1" + name;
-
-  const auto unit = parse_unit(name), si = parse_unit(si_unit);
+  UnitExpression spelled;
+  try {
+    spelled = read_unit(name);
+  } catch (const Error& e) {
+    throw error("understood the number ", digits, " and the unit \"", name, "\", but ", e.what(),
+                "; expected one number", example);
+  }
+  check_names(spelled, "; expected one" + convertible);
+  const auto unit = parse_unit(spelled.plain), si = parse_unit(si_unit);
   if (!si) throw error("\"", si_unit, "\" is no unit");
-  if (!unit) throw error("\"", name, "\" is no unit; expected one convertible to ", si_unit);
-  // Not ut_are_convertible(): that lets a period pass for a frequency.
-  const Owned<ut_unit> ratio(ut_divide(unit.get(), si.get()));
-  if (!ratio || !ut_is_dimensionless(ratio.get()))
-    throw error("\"", name, "\" has the wrong dimension; expected a unit convertible to ", si_unit);
+  if (!unit) throw error("\"", name, "\" is no unit; expected one", convertible);
+  if (dimension_of(unit.get()) != dimension_of(si.get()))
+    throw error("\"", name, "\" has the wrong dimension; expected a unit", convertible);
   const Owned<cv_converter> to(ut_get_converter(unit.get(), si.get()));
   if (!to) throw error("\"", name, "\" cannot be converted to ", si_unit);
   return cv_convert_double(to.get(), number);

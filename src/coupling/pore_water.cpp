@@ -10,6 +10,7 @@
 #include "dem/touching.hpp"
 #include "error.hpp"
 #include "fluid/step.hpp"
+#include "memory.hpp"
 
 namespace moraine::coupling {
 
@@ -255,10 +256,11 @@ class GridWater final : public PoreWater {
       if (!(g.length[a] > 0) || g.n[a] < 1)
         throw error("pore water: ", g.n[a], " cells over ", g.length[a], " m along ", "xyz"[a],
                     ": expected at least one cell and a length > 0 m");
-    const double bytes = 600.0 * g.n[0] * g.n[1] * g.n[2];
-    if (bytes > 16e9)
-      throw error("pore water: ", g.n[0], " x ", g.n[1], " x ", g.n[2], " cells need some ", bytes / 1e9,
-                  " GB; expected a larger fluid.cell (2 to 3 mean grain diameters)");
+    std::ostringstream cells;
+    cells << "pore water: " << g.n[0] << " x " << g.n[1] << " x " << g.n[2] << " cells";
+    expect_memory(bytes_a_cell * g.n[0] * g.n[1] * g.n[2], cells.str(),
+                  "; expected a larger fluid.cell (2 to 3 mean grain diameters), or fewer fluid.cells_x, "
+                  "cells_y, cells_z");
     return g;
   }
   static fluid::Sides sides_of(const Water& w) {

@@ -45,6 +45,8 @@ class PoreWater : public dem::Surroundings {
       const = 0;  // e.g. "water: 8 x 8 x 7 cells of 0.105 m (2.6 d), exchange every step, pcg"
 };
 
+constexpr double bytes_a_cell = 600;  // measured, without what CHOLMOD fills in
+
 // Whether this build has pore water in it (MORAINE_FLUID).
 bool water_built();
 

@@ -1,7 +1,8 @@
 #include "dem/engine_parts.hpp"
 
 #include <algorithm>
-#include <tuple>
+
+#include "dem/order.hpp"
 
 namespace moraine::dem {
 
@@ -65,18 +66,34 @@ Drive drive_of(const Scene& scene, const State& s) {
   return d;
 }
 
+std::string triple(const Vec3d& a) {
+  std::ostringstream text;
+  text.precision(9);
+  text << "(" << a.x << ", " << a.y << ", " << a.z << ")";
+  return text.str();
+}
+
+std::string at_step(std::int64_t step, double t, const std::string& of) {
+  std::ostringstream text;
+  text.precision(9);
+  text << " at step " << step << " (t = " << t << " s) of " << of;
+  return text.str();
+}
+
+std::string grain_there(Index id, const std::string& when, const Vec3d& x, const Vec3d& v) {
+  return "grain " + std::to_string(id) + when + ", position " + triple(x) + " m, velocity " + triple(v) +
+         " m/s: ";
+}
+
 Error lost_grain(const Scene& scene, const Drive& drive, const GrainRow& g, Index id) {
-  std::ostringstream place;
-  place.precision(9);
-  place << "grain " << id << " at step " << drive.step << " (t = " << scene.time(drive.step)
-        << " s of the stage), position (" << g.x.x << ", " << g.x.y << ", " << g.x.z << ") m, velocity ("
-        << g.v.x << ", " << g.v.y << ", " << g.v.z << ") m/s: ";
+  const std::string place = grain_there(
+      id, at_step(drive.step, scene.time(drive.step), "the stage (and those it carries on)"), g.x, g.v);
   const char* remedy =
       "; the step may be too long for the stiffness, or grains overlapped deeply: try a smaller model.f";
   if (!(dot(g.x, g.x) + dot(g.v, g.v) + dot(g.omega, g.omega) < 1e300))
-    return error(place.str(), "not a finite number", remedy);
-  if (scene.floor && g.x.z < -g.r) return error(place.str(), "fell through the floor", remedy);
-  return error(place.str(), "passed through the top wall (at ", drive.wall_z, " m)", remedy);
+    return error(place, "not a finite number", remedy);
+  if (scene.floor && g.x.z < -g.r) return error(place, "fell through the floor", remedy);
+  return error(place, "passed through the top wall (at ", drive.wall_z, " m)", remedy);
 }
 
 Vec3d kick(const Scene& scene, const State& s, Index i) {
@@ -123,11 +140,7 @@ void append_wall_contact(State& s, const Scene& scene, const Drive& drive, const
 }
 
 void finish_state(State& s, const Drive& d) {
-  std::sort(s.contacts.begin(), s.contacts.end(),
-            [](const Contact& a, const Contact& b) { return std::tie(a.i, a.j) < std::tie(b.i, b.j); });
-  std::sort(s.wall_contacts.begin(), s.wall_contacts.end(), [](const WallContact& a, const WallContact& b) {
-    return std::tie(a.wall, a.i) < std::tie(b.wall, b.i);
-  });
+  sort_contacts(s);
   s.wall_z = d.wall_z, s.wall_v = d.wall_v, s.layer_u = d.layer_u;
   s.wall_force = d.at.wall_force, s.shear_force = d.at.shear_force;
   s.water = d.water;

@@ -1,5 +1,6 @@
 // What both engines share beside the physics: reading a State in, writing it out, checking it.
 #pragma once
+#include <string>
 #include <vector>
 
 #include "dem/contact.hpp"
@@ -59,6 +60,12 @@ MORAINE_HD bool is_lost(const Scene& scene, const Drive& drive, const GrainRow& 
   if (scene.floor && g.x.z < -g.r) return true;
   return scene.top_wall.drive != TopWall::Drive::none && g.x.z > drive.wall_z + g.r;
 }
+
+// Where a grain is, for errors: "grain 5 at step 100 (t = 0.01 s) of stage fly, position (x, y, z) m,
+// velocity (x, y, z) m/s: ".
+std::string triple(const Vec3d& a);
+std::string at_step(std::int64_t step, double t, const std::string& of);
+std::string grain_there(Index id, const std::string& at_step, const Vec3d& x, const Vec3d& v);
 Error lost_grain(const Scene& scene, const Drive& drive, const GrainRow& g, Index id);
 
 // Whether grains and pore water meet at this step.

@@ -79,9 +79,13 @@ void sort_spatially(const Scene& scene, State& s) {
     c.i = place[c.i], c.j = place[c.j];
     if (c.i > c.j) std::swap(c.i, c.j), c.delta_t = -c.delta_t;
   }
+  for (WallContact& w : s.wall_contacts) w.i = place[w.i];
+  sort_contacts(s);
+}
+
+void sort_contacts(State& s) {
   std::sort(s.contacts.begin(), s.contacts.end(),
             [](const Contact& a, const Contact& b) { return std::tie(a.i, a.j) < std::tie(b.i, b.j); });
-  for (WallContact& w : s.wall_contacts) w.i = place[w.i];
   std::sort(s.wall_contacts.begin(), s.wall_contacts.end(), [](const WallContact& a, const WallContact& b) {
     return std::tie(a.wall, a.i) < std::tie(b.wall, b.i);
   });

@@ -11,4 +11,7 @@ namespace moraine::dem {
 // on the state alone.
 void sort_spatially(const Scene& scene, State& state);
 
+// Contacts by their grains, those with walls by wall and grain.
+void sort_contacts(State& state);
+
 }  // namespace moraine::dem

@@ -6,6 +6,7 @@
 
 #include "case/keys.hpp"
 #include "dem/spectrum.hpp"
+#include "run/needs.hpp"
 #include "run/precheck.hpp"
 #include "run/progress.hpp"
 #include "run/run.hpp"
@@ -92,9 +93,7 @@ void check_case(const Options& options) {
   std::printf(
       "  grains        %.0f, mean diameter %.4g m, box %.4g x %.4g m, bed about %.3g m (porosity 0.4)\n", n,
       diameter, start.box_x, start.box_y, settled);
-  // Records, rotation, mobility, some 3.5 candidates and near pairs a grain with springs, and the state kept
-  // for output.
-  std::printf("  memory        about %.0f MB\n", n * 2200 / 1e6 + 20);
+  std::printf("  memory        about %.0f MB\n", bytes_needed(n, c.has_water()) / 1e6);
 
   if (c.preset != "none" || c.softening != 1) {
     std::string f;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "dem/contact.hpp"
+#include "dem/engine_parts.hpp"
 #include "dem/grain.hpp"
 #include "error.hpp"
 
@@ -13,25 +14,12 @@ namespace {
 
 bool finite(const dem::Vec3d& a) { return std::isfinite(a.x + a.y + a.z); }
 
-std::string triple(const dem::Vec3d& a) {
-  std::ostringstream text;
-  text.precision(9);
-  text << "(" << a.x << ", " << a.y << ", " << a.z << ")";
-  return text.str();
-}
-
 std::string when(const Stage& stage, const dem::State& s) {
-  std::ostringstream text;
-  text << " at step " << s.step - stage.first_step << " (t = " << stage.time(s.step) << " s) of stage "
-       << stage.name;
-  return text.str();
+  return dem::at_step(s.step - stage.first_step, stage.time(s.step), "stage " + stage.name);
 }
 
 std::string grain_there(const Stage& stage, const dem::State& s, dem::Index i) {
-  std::ostringstream text;
-  text << "grain " << s.id[i] << when(stage, s) << ", position " << triple(s.x[i]) << " m, velocity "
-       << triple(s.v[i]) << " m/s: ";
-  return text.str();
+  return dem::grain_there(s.id[i], when(stage, s), s.x[i], s.v[i]);
 }
 
 void check_numbers(const Stage& stage, const dem::State& s) {
@@ -50,6 +38,13 @@ void check_numbers(const Stage& stage, const dem::State& s) {
 
 double stored(const output::Row& r) {
   return r.kinetic + r.rotational + r.elastic_normal + r.elastic_tangential + r.wall_kinetic;
+}
+
+// The measure of what is created or lost. Kinetic energies are v(n-1/2).v(n+1/2), which is negative for what
+// starts from rest; there is no motion then to measure by.
+double stored_at_least(const output::Row& r) {
+  return std::max(0.0, r.kinetic) + std::max(0.0, r.rotational) + r.elastic_normal + r.elastic_tangential +
+         std::max(0.0, r.wall_kinetic);
 }
 
 dem::Index most_energetic(const dem::Scene& scene, const dem::State& s) {
@@ -88,7 +83,7 @@ std::string describe(const Overlap& o, const dem::State& s) {
   std::ostringstream text;
   text << "overlaps ";
   if (o.j >= 0)
-    text << "grain " << s.id[o.j] << " at " << triple(s.x[o.j]) << " m";
+    text << "grain " << s.id[o.j] << " at " << dem::triple(s.x[o.j]) << " m";
   else
     text << (o.wall == dem::WallName::top ? "the top wall" : "the floor");
   text << " by " << o.depth << " m, " << o.fraction << " of the smaller radius";
@@ -128,7 +123,7 @@ void Guard::check_energy(const dem::State& s) {
   const output::Row now = row_of(static_cast<std::size_t>(first_.stage), stage_, s, start_);
   most_put_in_ = std::max(most_put_in_, energy_put_in({first_, now}));
   // Rounding of the potential energy may exceed what a bed at rest has stored.
-  const double had = stored(first_) + most_put_in_ + 1e-10 * std::abs(first_.potential);
+  const double had = stored_at_least(first_) + most_put_in_ + 1e-10 * std::abs(first_.potential);
   const double gained =
       stored(now) + now.potential - start_.energy - now.top_wall_work - now.layers_work - now.water_work;
   const bool ledger = stage_.scene.ledger;
@@ -138,10 +133,16 @@ void Guard::check_energy(const dem::State& s) {
   const bool too_much = !(created <= limits_.max_residue * had);
   const bool too_little = ledger && !(-created <= limits_.max_residue * had);
   if (!too_much && !too_little) return;
+  std::ostringstream how_much;
+  how_much.precision(9);
+  how_much << std::abs(created) << " J were " << (too_much ? "created" : "lost");
+  if (had > 0)
+    how_much << ", " << std::abs(created) / had << " of the " << had << " J stored and put in";
+  else
+    how_much << " where none was stored or put in";
+  if (!std::isfinite(created)) how_much.str("the energy grew beyond all numbers");
   throw error(grain_there(stage_, s, most_energetic(stage_.scene, s)), "moves with the most energy after ",
-              std::abs(created), " J were ", too_much ? "created" : "lost", ", ", std::abs(created) / had,
-              " of the ", had,
-              " J stored and put in; expected at most guards.max_residue = ", limits_.max_residue,
+              how_much.str(), "; expected at most guards.max_residue = ", limits_.max_residue,
               ": the step is too long for the stiffness or the damping (try a smaller model.f)");
 }
 

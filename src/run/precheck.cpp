@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dem/engine_parts.hpp"
 #include "error.hpp"
+#include "memory.hpp"
 #include "run/guard.hpp"
+#include "run/needs.hpp"
 
 namespace moraine::run {
 
@@ -105,11 +108,28 @@ void check_cells(const Stage& stage, std::vector<std::string>& warnings) {
           " mean diameters wide and measure pores rather than porosity; expected 2 to 3"));
 }
 
+// Of the grid of any stage, before hours are spent on those before it. Loose grains stand higher than the bed
+// they will make (of porosity 0.4).
+void check_room(const cases::Case& c, const Stage& stage, const dem::State& s) {
+  if (!stage.water.present) return;
+  double height = 0;
+  for (const double r : s.r) height += dem::sphere_volume(r) / 0.6 / stage.scene.area();
+  double levels = stage.water.cells[2];
+  if (c.fluid.cells_z == 0 && c.start.empty()) levels *= std::min(1.0, height / stage.height_0);
+  const double cells =
+      static_cast<double>(stage.water.cells[0]) * stage.water.cells[1] * std::max(1.0, levels);
+  expect_memory(
+      bytes_needed(s.size(), true, cells),
+      text("stage ", stage.name, ": ", s.size(), " grains and some ", cells, " cells of pore water"),
+      "; expected a larger fluid.cell (2 to 3 mean grain diameters), or fewer fluid.cells_x, cells_y, "
+      "cells_z");
+}
+
 void check_overlaps(const cases::Case& c, const dem::Scene& scene, const dem::State& s) {
   const Overlap o = deepest_overlap(scene, s);
   if (o.fraction <= c.guards.max_overlap) return;
-  throw error(c.start.empty() ? c.directory.string() : c.start.string(), ": grain ", s.id[o.i], " at (",
-              s.x[o.i].x, ", ", s.x[o.i].y, ", ", s.x[o.i].z, ") m ", describe(o, s),
+  throw error(c.start.empty() ? c.directory.string() : c.start.string(), ": grain ", s.id[o.i], " at ",
+              dem::triple(s.x[o.i]), " m ", describe(o, s),
               "; expected at most guards.max_overlap = ", c.guards.max_overlap,
               ": check radii, positions and box of the start");
 }
@@ -131,6 +151,7 @@ std::vector<std::string> precheck(const cases::Case& c, const Start& start, dem:
     check_step(stage, s, warnings);
     check_margin(stage, s, warnings);
     check_cells(stage, warnings);
+    check_room(c, stage, s);
     // Refuses what is impossible; a later stage of loose grains is judged when it comes, with its bed.
     std::unique_ptr<coupling::PoreWater> water;
     if (bed || !coupling::water_built()) water = fill(stage, s, now.water, stage.goes_on);

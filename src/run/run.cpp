@@ -7,8 +7,10 @@
 #include <csignal>
 #include <cstdio>
 #include <iostream>
+#include <set>
 
 #include "error.hpp"
+#include "memory.hpp"
 #include "output/files.hpp"
 #include "run/guard.hpp"
 #include "run/precheck.hpp"
@@ -43,6 +45,8 @@ void make_directories(const fs::path& path) {
   if (failed) throw error(path.string(), ": cannot be created: ", failed.message());
 }
 
+std::string in_words(const cases::Change& c) { return c.key + " was " + c.before + " and is now " + c.now; }
+
 std::string stability_of(const coupling::PoreWater& water, double dt) {
   const coupling::Stability s = water.stability();
   char text[160];
@@ -69,12 +73,12 @@ class Runner {
     progress_ = std::make_unique<Progress>(files_.log(), resuming, options_.quiet);
     try {
       run_stages(resuming);
-    } catch (const Error& e) {
+    } catch (const std::exception& e) {
       const bool kept = fs::exists(files_.checkpoint());
       const std::string after =
           kept ? "; the last good checkpoint stays in " + files_.checkpoint().string() : "";
-      progress_->say(std::string("stopped: ") + e.what() + after);
-      throw error(e.what(), after);
+      progress_->say("stopped: " + moraine::in_words(e) + after);
+      throw error(moraine::in_words(e), after);
     }
     return {now_.rows, false};
   }
@@ -94,23 +98,42 @@ class Runner {
     expect_no_results(options_);
     if (!fs::exists(files_.checkpoint())) return false;  // cut off before its first checkpoint
     now_ = output::read_checkpoint(files_.checkpoint());
-    if (now_.case_text != case_.resolved)
-      throw error(files_.checkpoint().string(), ": belongs to another version of this case (see ",
-                  files_.resolved().string(), "); undo the change, or use --force to run anew");
+    take_changes();
     return true;
   }
 
+  // What is no physics may be another since the checkpoint was written.
+  void take_changes() {
+    const std::string refused = changed_physics(now_.case_text, case_);
+    if (!refused.empty())
+      throw error(files_.checkpoint().string(), ": belongs to another version of this case: ", refused,
+                  "; undo the change, or use --force to run anew");
+    for (const cases::Change& c : cases::changes(now_.case_text, case_)) changes_.push_back(in_words(c));
+    now_.scene.neighbour_margin = case_.neighbour_margin;
+    now_.water_settings.solver = coupling::Solver(int(case_.fluid.solver));
+    now_.water_settings.tolerance = case_.fluid.tolerance;
+  }
+
+  // Snapshots later than the checkpoint are taken again, maybe at other times.
+  void remove_later_snapshots() {
+    std::set<std::string> kept;
+    for (const output::SnapshotInfo& s : now_.snapshots) kept.insert(s.file);
+    for (const auto& entry : fs::directory_iterator(files_.snapshots()))
+      if (entry.path().extension() == ".h5" && !kept.contains(entry.path().filename().string()))
+        fs::remove(entry.path());
+  }
+
   void run_stages(bool resuming) {
-    if (!resuming) {
-      now_ = start_.before;
-      now_.case_text = case_.resolved;
-    }
+    if (!resuming) now_ = start_.before;
+    now_.case_text = case_.resolved;
+    if (resuming) remove_later_snapshots();
     now_.version = MORAINE_VERSION;
     const std::string header = "# moraine " MORAINE_VERSION ", " + engine_->describe() + ", seed " +
                                std::to_string(case_.grains.seed) + "\n";
     output::write_text(files_.resolved(), header + case_.resolved);
     progress_->say((resuming ? "resumed: " : "") + case_.title + ": " +
                    std::to_string(start_.before.state.size()) + " grains, " + engine_->describe());
+    for (const std::string& c : changes_) progress_->say("changed: " + c);
     for (const std::string& w : warnings_) progress_->say("warning: " + w);
     series_ = std::make_unique<output::Series>(files_.series(), now_.rows, case_.has_water());
 
@@ -227,10 +250,14 @@ class Runner {
   }
 
   void snapshot(const Stage& stage) {
+    // By number within the stage; the interval may have changed on the way.
     char name[80];
-    std::snprintf(name, sizeof name, "%02d-%s-%06lld", static_cast<int>(now_.stage) + 1, stage.name.c_str(),
-                  static_cast<long long>(std::ceil((stage.time(now_.state.step) - 0.5 * stage.scene.dt) /
-                                                   stage.snapshot_interval)));
+    const int length =
+        std::snprintf(name, sizeof name, "%02d-%s-", static_cast<int>(now_.stage) + 1, stage.name.c_str());
+    const std::string beginning(name, static_cast<std::size_t>(length));
+    const auto number = std::count_if(now_.snapshots.begin(), now_.snapshots.end(),
+                                      [&](const auto& s) { return s.file.starts_with(beginning); });
+    std::snprintf(name, sizeof name, "%s%06lld", beginning.c_str(), static_cast<long long>(number));
     now_.snapshots.push_back(output::write_snapshot(files_.snapshots(), name, now_.rows.back().time,
                                                     stage.scene, now_.state,
                                                     water_ ? std::optional(water_->fields()) : std::nullopt));
@@ -258,7 +285,7 @@ class Runner {
   std::unique_ptr<coupling::PoreWater> water_;  // of the present stage
   std::unique_ptr<dem::Engine> engine_;
   std::unique_ptr<Progress> progress_;
-  std::vector<std::string> warnings_;
+  std::vector<std::string> warnings_, changes_;
   std::unique_ptr<output::Series> series_;
   std::chrono::steady_clock::time_point saved_ = std::chrono::steady_clock::now();
 };
@@ -277,6 +304,13 @@ void expect_no_results(const Options& options) {
     throw error(files.output.string(),
                 ": holds the results of an earlier run; use --resume to go on from its checkpoint, or "
                 "--force to replace it");
+}
+
+std::string changed_physics(const std::string& resolved_before, const cases::Case& now) {
+  std::string words;
+  for (const cases::Change& c : cases::changes(resolved_before, now))
+    if (c.physics) words += (words.empty() ? "" : "; ") + in_words(c);
+  return words;
 }
 
 Result run_one(const Options& options, const cases::Case& c) { return Runner(options, c).run(); }

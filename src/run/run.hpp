@@ -35,6 +35,10 @@ Result run_one(const Options& options, const cases::Case& c);
 // Throws Error where an earlier run has left results and neither resume nor force says what to do with them.
 void expect_no_results(const Options& options);
 
+// "KEY was A and is now B; ..." of the physics that is another than in an earlier run's resolved case; empty
+// where a run may go on.
+std::string changed_physics(const std::string& resolved_before, const cases::Case& now);
+
 // Control-C and an order to end make all runs of this process write a checkpoint and stop.
 void catch_signals();
 bool stopping();

@@ -8,6 +8,7 @@
 #include "dem/order.hpp"
 #include "dem/packing.hpp"
 #include "error.hpp"
+#include "run/needs.hpp"
 #include "run/schedule.hpp"
 
 namespace moraine::run {
@@ -89,6 +90,7 @@ Start start_of(const cases::Case& c) {
                                           : default_wall_mass(c, state.size(), c.grains.cell * 2 * r_max);
     return s;
   }
+  expect_room(c);
   const cases::Grains& g = c.grains;
   dem::Packing p;
   p.count = g.count;

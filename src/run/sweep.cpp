@@ -7,12 +7,17 @@
 #include <condition_variable>
 #include <cstdio>
 #include <deque>
+#include <fstream>
 #include <iostream>
+#include <iterator>
 #include <mutex>
 #include <thread>
 
 #include "backend/team.hpp"
 #include "error.hpp"
+#include "memory.hpp"
+#include "run/needs.hpp"
+#include "run/precheck.hpp"
 #include "run/progress.hpp"
 #include "run/record.hpp"
 #include "run/sweep_plan.hpp"
@@ -50,7 +55,7 @@ class Sweep {
   Sweep(const Options& options, int at_once)
       : directory_(options.directory / "sweep"), screen_(options.quiet) {
     Plan plan = plan_sweep(options.overrides);
-    columns_ = std::move(plan.columns);
+    columns_ = std::move(plan.columns), understood_ = std::move(plan.understood);
     const bool gpu = options.backend == dem::Backend::cuda ||
                      (options.backend == dem::Backend::automatic && dem::cuda_device_present());
     const int count = static_cast<int>(plan.cases.size());
@@ -69,21 +74,20 @@ class Sweep {
       job.plan = std::move(planned);
       expect_no_results(job.options);
     }
-    for (Job& job : jobs_) {
-      std::error_code failed;
-      fs::create_directories(job.options.directory, failed);
-      if (failed) throw error(job.options.directory.string(), ": cannot be created: ", failed.message());
-      output::write_text(job.options.directory / "case.toml",
-                         "# Written by `moraine sweep`.\n" +
-                             cases::extension_text(options.directory, job.plan.overrides, "../.."));
-      job.what = cases::load(job.options.directory);
-      for (std::size_t k = 0; k < job.what.stages.size(); ++k) job.work += expected_work(job.what, k);
-    }
+    const auto largest = std::max_element(jobs_.begin(), jobs_.end(), [](const Job& a, const Job& b) {
+      return a.what.grains.count < b.what.grains.count;
+    });
+    expect_room(largest->what, at_once_);
+    check_all();
+    // Those that go on first: they may be refused.
+    for (const bool begun : {true, false})
+      for (Job& job : jobs_)
+        if (fs::exists(job.options.directory / "output/case.toml") == begun) write_case(options, job);
   }
 
   void run() {
     screen_.say(std::to_string(jobs_.size()) + " cases, " + std::to_string(at_once_) + " at once, in " +
-                directory_.string());
+                directory_.string() + ": " + understood_);
     std::vector<std::thread> workers;
     for (int k = 0; k < at_once_; ++k) workers.emplace_back([this] { work(); });
     watch();
@@ -92,6 +96,49 @@ class Sweep {
   }
 
  private:
+  // What would be refused before its first step is refused before any case begins, and leaves nothing behind.
+  void check_all() {
+    std::vector<std::string> refused(jobs_.size());
+    std::atomic<std::size_t> next = 0;
+    const auto check = [&] {
+      for (std::size_t k; (k = next++) < jobs_.size();) {
+        const Job& job = jobs_[k];
+        try {
+          precheck(job.what, start_of(job.what), *dem::make_engine(job.options.backend, job.options.threads));
+        } catch (const std::exception& e) {
+          refused[k] = job.plan.name + ": " + in_words(e);
+        }
+      }
+    };
+    std::vector<std::thread> workers;
+    for (int k = 0; k < at_once_; ++k) workers.emplace_back(check);
+    for (std::thread& worker : workers) worker.join();
+    for (const std::string& message : refused)
+      if (!message.empty()) throw Error(message);
+  }
+
+  void write_case(const Options& options, Job& job) {
+    const fs::path directory = job.options.directory, file = directory / "case.toml";
+    std::error_code failed;
+    fs::create_directories(directory, failed);
+    if (failed) throw error(directory.string(), ": cannot be created: ", failed.message());
+    const auto text_in = [](const fs::path& path) {
+      std::ifstream text(path);
+      return std::string(std::istreambuf_iterator<char>(text), {});
+    };
+    const std::string before = text_in(file), resolved_before = text_in(directory / "output/case.toml");
+    output::write_text(file, "# Written by `moraine sweep`.\n" +
+                                 cases::extension_text(options.directory, job.plan.overrides, "../.."));
+    job.what = cases::load(directory);
+    for (std::size_t k = 0; k < job.what.stages.size(); ++k) job.work += expected_work(job.what, k);
+    if (!options.resume || resolved_before.empty()) return;
+    if (const std::string changed = changed_physics(resolved_before, job.what); !changed.empty()) {
+      output::write_text(file, before);
+      throw error(directory.string(), ": holds results of another version of this case: ", changed,
+                  "; undo the change, or use --force to run anew");
+    }
+  }
+
   void work() {
     while (Job* job = take()) {
       std::string message;
@@ -99,7 +146,7 @@ class Sweep {
       try {
         result = run_one(job->options, job->what);
       } catch (const std::exception& e) {
-        message = e.what();
+        message = in_words(e);
       }
       const std::lock_guard lock(mutex_);
       job->state = message.empty() ? State::finished : State::failed;
@@ -204,6 +251,7 @@ class Sweep {
 
   fs::path directory_;
   std::vector<std::string> columns_;
+  std::string understood_;
   Screen screen_;
   int at_once_ = 1;
   std::deque<Job> jobs_;

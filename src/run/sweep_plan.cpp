@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cstdlib>
 
+#include "case/keys.hpp"
+#include "case/quantity.hpp"
 #include "error.hpp"
 
 namespace moraine::run {
@@ -19,15 +20,16 @@ string trimmed(const string& text) {
 
 struct Value {
   string number, unit;  // a text that begins with no number is all `number`
-  string text() const { return number + (unit.empty() ? "" : " " + unit); }
+  string text;          // as it is set
 };
 
-Value split_unit(const string& text) {
-  char* after = nullptr;
-  std::strtod(text.c_str(), &after);
-  if (after == text.c_str()) return {text, ""};
-  return {text.substr(0, after - text.c_str()), trimmed(after)};
+Value value_of(const string& text) {
+  const cases::Quantity q = cases::split_quantity(text);
+  if (q.number.empty()) return {text, "", text};
+  return {q.number, q.unit, text};
 }
+
+bool is_number(const Value& v) { return !cases::split_quantity(v.number).number.empty(); }
 
 // What stands between the commas outside of quotes and brackets; a last comma ends the list.
 std::vector<string> parts_of(const string& text) {
@@ -55,17 +57,29 @@ std::vector<string> parts_of(const string& text) {
 bool is_list(const cases::Override& set) { return parts_of(set.value).size() > 1; }
 
 std::vector<Value> values_of(const cases::Override& set) {
+  const string stated = "--set " + set.key + "=" + set.value + ": ";
   std::vector<string> parts = parts_of(set.value);
   if (trimmed(parts.back()).empty()) parts.pop_back();
   std::vector<Value> values;
   for (const string& part : parts) {
-    values.push_back(split_unit(trimmed(part)));
-    if (values.back().number.empty())
-      throw error("--set ", set.key, "=", set.value, ": a value of the list is empty; expected 10,20,40 kPa");
+    values.push_back(value_of(trimmed(part)));
+    const string& number = values.back().number;
+    if (number.empty()) throw error(stated, "a value of the list is empty; expected 10,20,40 kPa");
+    if (parts.size() > 1 && number.size() > 1 && number.find_first_not_of("0123456789") == number.npos &&
+        number[0] == '0')
+      throw error(stated, "understood a list of ", parts.size(), " values, with \"", values.back().text,
+                  "\" among them; expected thousands and decimals without a comma");
   }
-  const auto is_number = [](const Value& v) { return split_unit(v.number + "_").unit == "_"; };
-  for (Value& v : values)
-    if (v.unit.empty() && is_number(v)) v.unit = values.back().unit;
+  const auto last = std::find_if(values.rbegin(), values.rend(), is_number);
+  if (last == values.rend()) return values;
+  const Value unit_giver = *last;
+  for (Value& v : values) {
+    if (!is_number(v)) continue;
+    if (unit_giver.unit.empty() && !v.unit.empty())
+      throw error(stated, "\"", v.text, "\" has a unit and \"", unit_giver.text,
+                  "\" has none; expected one behind the last number, which is that of all, or behind each");
+    if (v.unit.empty() && !unit_giver.unit.empty()) v.unit = unit_giver.unit, v.text += " " + v.unit;
+  }
   return values;
 }
 
@@ -97,13 +111,20 @@ string short_name(const string& key, const std::vector<cases::Override>& lists) 
 
 Plan plan_sweep(const std::vector<cases::Override>& sets) {
   std::vector<cases::Override> fixed, lists;
-  for (const cases::Override& set : sets) (is_list(set) ? lists : fixed).push_back(set);
+  for (const cases::Override& set : sets) {
+    for (const cases::Override& other : sets)
+      if (&other != &set && other.key == set.key)
+        throw error("--set ", set.key, "=", set.value, " and --set ", other.key, "=", other.value,
+                    ": expected each key once");
+    (is_list(set) ? lists : fixed).push_back(set);
+  }
   if (lists.empty())
     throw error(
         "sweep: nothing to sweep; expected a list of values, such as --set normal_stress=10,20,40kPa, or of "
         "one: --set normal_stress=10kPa,");
 
-  Plan plan{{}, {{"", fixed, {}}}};
+  Plan plan{{}, {{"", fixed, {}}}, ""};
+  std::vector<std::vector<string>> names(1);  // of each case, a part for each list
   for (const cases::Override& list : lists) {
     const std::vector<Value> values = values_of(list);
     const string name = short_name(list.key, lists), unit = values[0].unit;
@@ -111,15 +132,22 @@ Plan plan_sweep(const std::vector<cases::Override>& sets) {
         std::all_of(values.begin(), values.end(), [&](const Value& v) { return v.unit == unit; });
     plan.columns.push_back(one_unit && !unit.empty() ? name + " (" + unit + ")" : name);
     std::vector<PlannedCase> product;
-    for (const PlannedCase& c : plan.cases)
+    std::vector<std::vector<string>> product_names;
+    for (std::size_t k = 0; k < plan.cases.size(); ++k)
       for (const Value& v : values) {
-        PlannedCase& next = product.emplace_back(c);
-        if (!next.name.empty()) next.name += "+";
-        next.name += name + "-" + safe(v);
-        next.overrides.push_back({list.key, v.text()});
-        next.values.push_back(one_unit ? v.number : v.text());
+        PlannedCase& next = product.emplace_back(plan.cases[k]);
+        next.overrides.push_back({list.key, v.text});
+        next.values.push_back(one_unit ? v.number : v.text);
+        product_names.emplace_back(names[k]).push_back(name + "-" + safe(v));
       }
-    plan.cases = std::move(product);
+    plan.cases = std::move(product), names = std::move(product_names);
+    std::vector<string> texts;
+    for (const Value& v : values) texts.push_back(v.text);
+    plan.understood += (plan.understood.empty() ? "" : "; ") + name + " = " + cases::join(texts, ", ");
+  }
+  for (std::size_t k = 0; k < plan.cases.size(); ++k) {
+    std::sort(names[k].begin(), names[k].end());
+    plan.cases[k].name = cases::join(names[k], "+");
   }
   for (const PlannedCase& c : plan.cases)
     if (std::count_if(plan.cases.begin(), plan.cases.end(),

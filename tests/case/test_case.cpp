@@ -433,6 +433,50 @@ TEST_F(CaseTest, errors_of_overrides) {
   EXPECT_EQ(fault({{"extends", "../a"}}), "--set extends=../a: only case.toml can say what it extends");
 }
 
+TEST_F(CaseTest, a_number_too_many_in_an_override) {
+  write(settle + shear);
+  EXPECT_EQ(load({{"normal_stress", "12 500 Pa"}}).stages[1].normal_stress, 12500);
+  for (const char* wrong :
+       {"12 50 Pa", "1.2.5 kPa", "2 kPa.5", "12 kPa 3", "12,500 Pa", "12,5", "1 2", "80 # kPa"})
+    EXPECT_NE(fault({{"normal_stress", wrong}}), "no error") << wrong;
+  for (const char* wrong : {"0.3 0.5", "1/3", "0,3", "30 degree", "0.3 1", "0.3 # 0.5"})
+    EXPECT_NE(fault({{"contact.mu_s", wrong}}), "no error") << wrong;
+  for (const char* wrong : {"1 2", "1,000", "5 # 6", "1 000"})
+    EXPECT_NE(fault({{"seed", wrong}}), "no error") << wrong;
+  EXPECT_EQ(
+      fault_of(settle + "gamma_n = \"12 500 3 N s/m\"\n"),
+      "x/case.toml:5: stage.settle.gamma_n = \"12 500 3 N s/m\": understood the number 12500 and the unit "
+      "\"3 N s/m\", but \"3 N s/m\" is another number; expected one number and a unit, as in \"1 N s/m\"");
+}
+
+// What names a stage goes before what is meant for each, and no key is set twice.
+TEST_F(CaseTest, the_order_of_overrides_does_not_matter) {
+  write(settle + shear);
+  const Override each{"normal_stress", "40 kPa"}, one{"stage.shear.normal_stress", "20 kPa"};
+  EXPECT_EQ(load({each, one}).stages[1].normal_stress, 20e3);
+  EXPECT_EQ(load({one, each}).stages[1].normal_stress, 20e3);
+  EXPECT_EQ(fault({{"seed", "1"}, {"grains.seed", "2"}}),
+            "--set seed=1 and --set grains.seed=2: expected each key once");
+  EXPECT_EQ(fault({each, {"normal_stress", "50 kPa"}}),
+            "--set normal_stress=40 kPa and --set normal_stress=50 kPa: expected each key once");
+  EXPECT_EQ(fault({one, one}),
+            "--set stage.shear.normal_stress=20 kPa and --set "
+            "stage.shear.normal_stress=20 kPa: expected each key once");
+}
+
+TEST_F(CaseTest, errors_take_one_line) {
+  for (const std::string wrong :
+       {"a = [1,\n2", "title = \"a\nb\"", "[contact]\nk_n = \"\"\"1\n2 N/m\"\"\"",
+        "[contact.k_n]\na = 1\nb = 2", "[contact]\n\"k\\nn\" = 1", "[contact]\nk_n = [1,\n2]", "= 1",
+        "[model]\nf = 0.1.2", "[model]\nf = 1 2", "a = 1\nb = 2\na.b = 3"}) {
+    const std::string found = fault_of(wrong + "\n" + settle);
+    EXPECT_NE(found, "no error") << wrong;
+    EXPECT_EQ(found.find('\n'), found.npos) << found;
+  }
+  write(settle);
+  EXPECT_EQ(fault({{"contact.k_n", "1\n2"}}).find('\n'), std::string::npos);
+}
+
 TEST_F(CaseTest, stages_are_named_once_and_well) {
   EXPECT_EQ(fault_of("title = \"\"\n"), "x/case.toml: no stages; expected at least one [[stage]]");
   EXPECT_EQ(fault_of("[stage]\nname = \"a\"\n"),

@@ -19,6 +19,7 @@ def test_names_are_those_of_a_sweep():
     assert stress_names("10,20 kPa") == ["10kPa", "20kPa"]
     assert stress_names("80 kPa,") == ["80kPa"]
     assert stress_names("10 kPa, 1 bar") == ["10kPa", "1bar"]
+    assert stress_names("12 500, 15 000 Pa") == ["12500Pa", "15000Pa"]
 
 
 def test_a_study_and_its_cases():

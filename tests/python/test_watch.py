@@ -275,3 +275,12 @@ def test_a_plot_shows_what_it_is_given():
 def test_times_are_told_as_people_do():
     told = {3: "3 s", 61: "1 min 1 s", 7260: "2 h 1 min", 90000: "1 d 1 h"}
     assert {s: progress.readable(s) for s in told} == told
+
+
+def test_misspelt_options_name_the_nearest(capsys):
+    for words, said in [(["watch", "CASE", "--onec"], "--onec: unknown option of watch; did you mean --once?"),
+                        (["figures", "CASE", "--formt", "pdf"], "--formt: unknown option of figures; did you mean --format?"),
+                        (["watch", "CASE", "--qqq"], "--qqq: unknown option of watch; see moraine watch --help"),
+                        (["watch", "CASE", "more"], "more: one word too many for watch; see moraine watch --help")]:
+        assert main(words) == 1
+        assert capsys.readouterr().err == f"moraine: {said}\n"

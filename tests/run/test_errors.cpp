@@ -64,6 +64,108 @@ TEST_F(Errors, SetOnTheCommandLine) {
   expect_error(to_run(small, {"model.f"}), {"--set model.f", "KEY=VALUE"});
 }
 
+// No word at all: what the program is and how to begin; from the launcher, too, which need not build for it.
+TEST_F(Errors, NoCommand) {
+  const Outcome o = moraine({});
+  EXPECT_EQ(o.status, 0);
+  EXPECT_EQ(o.err, "");
+  EXPECT_TRUE(o.out.starts_with("Moraine computes"));
+  for (const char* command : {"run", "check", "watch", "figures", "sweep", "keys"})
+    EXPECT_NE(o.out.find("\n  " + std::string(command) + " "), std::string::npos) << command;
+  Process launcher(MORAINE_SOURCE_DIR "/moraine", {}, directory.path() / "out", directory.path() / "err");
+  EXPECT_EQ(launcher.wait(), 0);
+  EXPECT_EQ(contents(directory.path() / "out"), o.out);
+}
+
+TEST_F(Errors, MisspeltCommandsAndOptions) {
+  for (const auto& [typed, meant] :
+       std::vector<std::pair<std::string, std::string>>{{"runn", "run"},
+                                                        {"rn", "run"},
+                                                        {"swep", "sweep"},
+                                                        {"chekc", "check"},
+                                                        {"kesy", "keys"},
+                                                        {"wacth", "watch"},
+                                                        {"figure", "figures"},
+                                                        {"repor", "report"},
+                                                        {"til", "till"},
+                                                        {"reproduse", "reproduce"},
+                                                        {"tset", "test"}})
+    expect_error({typed, "cases/quick-shear"}, {typed + ": unknown command; did you mean " + meant + "?"});
+  expect_error({"xyzzy"}, {"xyzzy: unknown command; known: ", "watch", "import-sphere"});
+  expect_error({"watch", "x"}, {"watch: a command of the launcher, ./moraine watch"});
+  for (const auto& [command, typed, meant] :
+       std::vector<std::array<std::string, 3>>{{"run", "--resum", "--resume"},
+                                               {"run", "--forse", "--force"},
+                                               {"sweep", "--atonce", "--at-once"},
+                                               {"check", "--thread", "--threads"},
+                                               {"bench", "--step", "--steps"},
+                                               {"run", "--backnd", "--backend"}})
+    for (const std::vector<std::string>& words :
+         {std::vector<std::string>{command, typed}, {command, "x", typed, "3"}})
+      expect_error(words, {typed + ": unknown option of " + command + "; did you mean " + meant + "?"});
+  expect_error({"--versoin"}, {"--versoin: unknown option; did you mean --version?"});
+  expect_error({"run"}, {"CASE is required; see moraine run --help"});
+  expect_error({"check", "a", "b"}, {"b: one word too many for check"});
+}
+
+TEST_F(Errors, KeysAboutSomething) {
+  const auto keys = [&](const std::vector<std::string>& words) {
+    std::vector<std::string> all{"keys"};
+    all.insert(all.end(), words.begin(), words.end());
+    return moraine(all).out;
+  };
+  const std::string wall = keys({"wall"});
+  for (const char* key : {"\n[wall]\n", "\n  mass ", "\n  wall_mu ", "\n  normal_stress "})
+    EXPECT_NE(wall.find(key), std::string::npos) << key;
+  for (const char* key : {"\n[guards]\n", "\n  seed ", "\n  mu_s "})
+    EXPECT_EQ(wall.find(key), std::string::npos) << key;
+  EXPECT_EQ(keys({"WALL"}), wall);
+  EXPECT_EQ(keys({"normal stress", "amplitude"}), keys({"normal_stress_amplitude"}));
+  EXPECT_EQ(keys({"stage.shear.hold_layer_height"}), keys({"stage.hold_layer_height"}));
+  expect_error({"keys", "walll"}, {"keys walll: no key has this word", "did you mean wall?"});
+  expect_error({"keys", "wall", "zzz"},
+               {"keys wall zzz: no key has these words", "`moraine keys` lists all"});
+}
+
+// Of the machine, or of what `ulimit` leaves.
+TEST_F(Errors, TooManyGrains) {
+  const fs::path small = make("small", small_case());
+  const std::vector<std::string> many{"--set", "count=2e9"};
+  for (const std::vector<std::string>& command : {std::vector<std::string>{"run", small.string()},
+                                                  {"check", small.string()},
+                                                  {"bench", small.string()},
+                                                  {"run", small.string(), "--backend", "cuda"},
+                                                  {"sweep", small.string(), "--set", "seed=1,2"}}) {
+    auto words = command;
+    words.insert(words.end(), many.begin(), many.end());
+    expect_error(words, {"grains.count = 2000000000 grains need about ", " GB of memory, and there are ",
+                         "expected at most "});
+  }
+  for (const char* set : {"fluid.cells_z=1000000", "fluid.cell=1e-4"})
+    expect_error(
+        {"check", small.string(), "--set", set, "--set", "stage.shear.fluid=true", "--set",
+         "fluid.cells_x=3000", "--set", "fluid.cells_y=3000"},
+        {"stage shear: 300 grains and some ", "cells of pore water need about", "larger fluid.cell"});
+  EXPECT_FALSE(fs::exists(small / "output"));
+  EXPECT_FALSE(fs::exists(small / "sweep"));
+
+  const auto with_less = [&](const std::string& count) {
+    Process limited(
+        "/bin/sh",
+        {"-c", "ulimit -v 400000; exec " MORAINE_PROGRAM " check " + small.string() +
+                   " --threads 1 --backend cpu --set columns_x=50 --set columns_y=50 --set count=" + count},
+        directory.path() / "out", directory.path() / "err");
+    return limited.wait();
+  };
+  EXPECT_EQ(with_less("1e6"), 1);
+  const std::string said = contents(directory.path() / "err");
+  EXPECT_NE(said.find("there are 0.41 GB (limit set by ulimit)"), std::string::npos) << said;
+  const std::string at_most = "expected at most ";
+  const int fit = std::stoi(said.substr(said.find(at_most) + at_most.size()));
+  EXPECT_GT(fit, 50'000);
+  EXPECT_EQ(with_less(std::to_string(fit)), 0) << contents(directory.path() / "err");
+}
+
 TEST_F(Errors, GrainsOverlapAtTheStart) {
   expect_error_in("cell = 1.3", "cell = 0.9", {"bad/case.toml:6", "grains.cell = 0.9", "expected >= 1.05"});
   const fs::path small = make("small", small_case());

@@ -105,6 +105,28 @@ TEST_F(Guards, EnergyCreated) {
   }
 }
 
+// Two grains that begin at rest, pressed together: kinetic energy, v(n-1/2).v(n+1/2), begins below zero, and
+// in an unstable step by more than the springs hold.
+TEST_F(Guards, EnergyIsMeasuredByWhatIsThere) {
+  const double limit = std::sqrt(2 * m / k), deep = 0.1 * r;
+  const auto jump = [&](double of_limit, const std::string& ledger) {
+    const fs::path made =
+        grains({{0.05 - 0.5 * (2 * r - deep), 0.05, 0.05}, {0.05 + 0.5 * (2 * r - deep), 0.05, 0.05}},
+               {{}, {}}, "dt = " + std::to_string(of_limit * limit) + "\n" + settle());
+    auto words = to_run(made, {"model.ledger=" + ledger, "guards.interval=1", "contact.mu_s=0"});
+    words.push_back("--force");
+    return words;
+  };
+  for (const char* ledger : {"true", "false"}) {
+    const Outcome good = moraine(jump(0.1, ledger));
+    EXPECT_EQ(good.status, 0) << good.err;
+    expect_error(jump(1.05, ledger), {"J were created, ", " J stored and put in"});
+    const std::string said = contents(directory.path() / "err");
+    const double had = std::stod(said.substr(said.find(" of the ") + 8));
+    EXPECT_NEAR(had, 0.5 * k * deep * deep, 1e-6 * k * deep * deep) << said;
+  }
+}
+
 // Damping that pushes balances in the ledger, which books a negative dissipation.
 TEST_F(Guards, DampingOfALightWall) {
   const fs::path made = grains({{0.05, 0.05, 0.999 * r}}, {{}}, R"(dt = 1e-5
@@ -185,6 +207,42 @@ TEST(Guard, NumbersThatAreNotFinite) {
   EXPECT_NE(check(bad).find("top wall or driven layer at step 0"), std::string::npos);
   bad = good, bad.wall_z = -1;
   EXPECT_NE(check(bad).find("fell through the floor"), std::string::npos);
+}
+
+// Whatever the first row holds, the message counts in energy that is there.
+TEST(Guard, EnergyWhereNoneIsStored) {
+  run::Stage stage{};
+  stage.name = "one";
+  stage.scene.dt = 1e-5, stage.scene.gravity = 0;
+  const dem::State rest = dem::grains_at_rest({r, r}, {{0.03, 0.03, 0.02}, {0.07, 0.07, 0.02}});
+  dem::State moving = rest;
+  moving.v[1] = {1, 0, 0};
+  const auto check = [&](const dem::State& s, const output::Row& first) {
+    try {
+      output::StageStart start;
+      start.energy = first.kinetic + first.rotational + first.elastic_normal + first.elastic_tangential +
+                     first.wall_kinetic + first.potential;
+      run::Guard({10, 0.2, 0.1}, stage, {first}, start).check(s);
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string("healthy");
+  };
+  EXPECT_EQ(check(rest, {}), "healthy");
+  output::Row first{};
+  EXPECT_NE(check(moving, first).find("J were created where none was stored or put in"), std::string::npos)
+      << check(moving, first);
+  for (double output::Row::*part :
+       {&output::Row::kinetic, &output::Row::rotational, &output::Row::wall_kinetic}) {
+    first = {}, first.*part = -0.0058;
+    EXPECT_EQ(check(moving, first).find("-0.0058"), std::string::npos) << check(moving, first);
+    first.potential = 1;  // now gone, which is put in
+    EXPECT_NE(check(rest, first).find("J were lost, "), std::string::npos) << check(rest, first);
+    EXPECT_NE(check(rest, first).find(" of the 1"), std::string::npos) << check(rest, first);
+  }
+  moving.v[1] = {1e160, 0, 0};
+  EXPECT_NE(check(moving, {}).find("the energy grew beyond all numbers"), std::string::npos)
+      << check(moving, {});
 }
 
 }  // namespace

@@ -154,13 +154,80 @@ TEST_F(Restart, AFinishedCaseIsLeftAlone) {
 
 TEST_F(Restart, RefusesAChangedCase) {
   run_for(0.5 * length, SIGKILL);
-  auto words = to_run(cut, {"stage.shear.normal_stress=3 kPa"});
+  auto words = to_run(cut, {"stage.shear.normal_stress=3 kPa", "output.series_interval=0.02"});
   words.push_back("--resume");
   const Outcome o = moraine(words);
   EXPECT_EQ(o.status, 1);
-  for (const char* word : {"checkpoint.h5", "another version of this case", "--force"})
+  for (const char* word : {"checkpoint.h5", "another version of this case",
+                           "stage.shear.normal_stress was 2000.0 Pa and is now 3000.0 Pa", "--force"})
     EXPECT_NE(o.err.find(word), std::string::npos) << o.err;
+  EXPECT_EQ(o.err.find("series_interval"), std::string::npos) << o.err;
   finish_and_compare();
+}
+
+TEST_F(Restart, RefusesOtherStages) {
+  run_for(0.5 * length, SIGKILL);
+  expect_error(
+      {"run", cut.string(), "--quiet", "--backend", "cpu", "--resume", "--set", "stages=[\"settle\"]"},
+      {"stages was settle, consolidate, shear and is now settle;"});
+  finish_and_compare();
+}
+
+// What is no physics may change on the way: the bits are those of the run that was not cut.
+TEST_F(Restart, GoesOnWithOtherGuardsMarginAndTitle) {
+  run_for(0.5 * length, SIGTERM);
+  ASSERT_NO_FATAL_FAILURE(
+      run(cut,
+          {"guards.interval=77", "guards.max_overlap=0.19", "guards.max_residue=0.2",
+           "model.neighbour_margin=5 mm", "title=another", "output.checkpoint_interval=1"},
+          {"--resume"}));
+  expect_same_results(whole, cut);
+  const std::string log = contents(cut / "output/log.txt");
+  EXPECT_NE(log.find("changed: guards.interval was 20000 and is now 77"), std::string::npos) << log;
+  EXPECT_NE(log.find("changed: model.neighbour_margin was 0.0 m and is now 0.005 m"), std::string::npos)
+      << log;
+  EXPECT_NE(output::read_checkpoint(checkpoint_of(cut)).case_text.find("title = \"another\""),
+            std::string::npos);
+  EXPECT_NE(contents(cut / "output/case.toml").find("interval = 77"), std::string::npos);
+}
+
+// Records at other times from there on, of the same motion; no snapshot takes the place of an earlier one.
+TEST_F(Restart, GoesOnWithOtherIntervals) {
+  if (!run_for(0.6 * length, SIGTERM)) GTEST_SKIP() << "the run was over too soon";
+  const auto before = output::read_checkpoint(checkpoint_of(cut));
+  std::vector<std::string> bytes;
+  for (const auto& s : before.snapshots) bytes.push_back(contents(cut / "output/snapshots" / s.file));
+  ASSERT_NO_FATAL_FAILURE(
+      run(cut, {"output.series_interval=0.02", "output.snapshot_interval=0.03"}, {"--resume"}));
+  const auto rows = output::read_series(series_of(cut)), all = output::read_series(series_of(whole));
+  ASSERT_GT(rows.size(), before.rows.size());
+  ASSERT_LT(rows.size(), all.size());
+  for (const output::Row& row : rows)
+    EXPECT_TRUE(std::any_of(all.begin(), all.end(), [&](const auto& r) { return same_bits(r, row); }))
+        << row.time;
+  const auto after = output::read_checkpoint(checkpoint_of(cut));
+  ASSERT_GT(after.snapshots.size(), before.snapshots.size());
+  EXPECT_EQ(snapshots_of(cut).size(), after.snapshots.size());
+  for (std::size_t k = 0; k < bytes.size(); ++k)
+    EXPECT_TRUE(contents(cut / "output/snapshots" / after.snapshots[k].file) == bytes[k]) << k;
+}
+
+// There the steps fit the times of records.
+TEST_F(Restart, WithAutomaticStepsTheIntervalOfRecordsIsPhysics) {
+  const fs::path own = make("auto", small_case());
+  const std::vector<std::string> sets{"model.dt=auto", "stage.settle.duration=0.05", "stages=[\"settle\"]"};
+  run(own, sets);
+  const auto with = [&](const std::string& set) {
+    auto changed = sets;
+    changed.push_back(set);
+    auto words = to_run(own, changed);
+    words.push_back("--resume");
+    return words;
+  };
+  expect_error(with("output.series_interval=0.02"), {"output.series_interval was 0.01 s and is now 0.02 s"});
+  expect_error(with("output.snapshot_interval=0.02"),
+               {"output.snapshot_interval was 0.1 s and is now 0.02 s"});
+  EXPECT_EQ(moraine(with("guards.interval=10")).status, 0);
 }
 
 TEST_F(Restart, RefusesToStartFromAnUnfinishedCase) {

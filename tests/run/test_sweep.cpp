@@ -47,8 +47,8 @@ TEST(SweepPlan, ValuesMayHaveUnitsOfTheirOwn) {
 
 TEST(SweepPlan, ListsGiveTheirProduct) {
   EXPECT_EQ(names(plan_sweep({{"grains.seed", "1,2"}, {"box.periodic", "x,xy"}})),
-            (std::vector<std::string>{"seed-1+periodic-x", "seed-1+periodic-xy", "seed-2+periodic-x",
-                                      "seed-2+periodic-xy"}));
+            (std::vector<std::string>{"periodic-x+seed-1", "periodic-xy+seed-1", "periodic-x+seed-2",
+                                      "periodic-xy+seed-2"}));
   EXPECT_EQ(names(plan_sweep({{"stage.a.mu_s", "1,2"}, {"stage.b.mu_s", "3,4"}}))[0], "a.mu_s-1+b.mu_s-3");
 }
 
@@ -69,6 +69,50 @@ TEST(SweepPlan, SaysWhatIsWrong) {
   EXPECT_NE(fault({{"seed", "1,,2"}}).find("--set seed=1,,2: a value of the list is empty"),
             std::string::npos);
   EXPECT_NE(fault({{"seed", "1,2,1"}}).find("seed-1; expected every value once"), std::string::npos);
+}
+
+// The order of the lists is that of the cases, not of the words in a name.
+TEST(SweepPlan, NamesDoNotDependOnTheOrderOfLists) {
+  const cases::Override seeds{"seed", "1,2"}, stresses{"normal_stress", "10,20 kPa"}, fixed{"model.f", "0.1"};
+  const auto sorted = [](const std::vector<cases::Override>& sets) {
+    auto list = names(plan_sweep(sets));
+    std::sort(list.begin(), list.end());
+    return list;
+  };
+  EXPECT_EQ(names(plan_sweep({stresses, seeds}))[1], "normal_stress-10kPa+seed-2");
+  EXPECT_EQ(sorted({stresses, seeds}), sorted({seeds, fixed, stresses}));
+  EXPECT_NE(names(plan_sweep({stresses, seeds})), names(plan_sweep({seeds, stresses})));
+}
+
+TEST(SweepPlan, AKeyIsSetOnce) {
+  for (const auto& sets : std::vector<std::vector<cases::Override>>{{{"seed", "1,2"}, {"seed", "3,4"}},
+                                                                    {{"seed", "5"}, {"seed", "1,2"}},
+                                                                    {{"seed", "1,2"}, {"seed", "5"}}})
+    EXPECT_NE(fault(sets).find(": expected each key once"), std::string::npos) << fault(sets);
+}
+
+// Each value is what it would be in case.toml: none with another's digits.
+TEST(SweepPlan, NumbersInLists) {
+  const auto set_to = [](const std::string& list) {
+    std::vector<std::string> values;
+    for (const auto& c : plan_sweep({{"normal_stress", list}}).cases) values.push_back(c.overrides[0].value);
+    return values;
+  };
+  using List = std::vector<std::string>;
+  EXPECT_EQ(set_to("12 500, 15 000 Pa"), (List{"12 500 Pa", "15 000 Pa"}));
+  EXPECT_EQ(set_to("12,500 Pa"), (List{"12 Pa", "500 Pa"}));
+  EXPECT_EQ(set_to("4.5e-10,1e-9 1/Pa"), (List{"4.5e-10 1/Pa", "1e-9 1/Pa"}));
+  EXPECT_EQ(set_to("1,2 N s/m"), (List{"1 N s/m", "2 N s/m"}));
+  EXPECT_EQ(set_to("1,2 m s-2"), (List{"1 m s-2", "2 m s-2"}));
+  EXPECT_EQ(set_to("1,2 10 kPa"), (List{"1 10 kPa", "2 10 kPa"}));  // refused where it is read
+  EXPECT_EQ(set_to("0.1,0.2 ms,auto"), (List{"0.1 ms", "0.2 ms", "auto"}));
+  EXPECT_EQ(names(plan_sweep({{"normal_stress", "12 500 Pa,"}})), List{"normal_stress-12500Pa"});
+  for (const char* parts_of_one : {"12,000 Pa", "1,160,000,000", "1,05 kPa", "10,00 kPa"})
+    EXPECT_NE(fault({{"k_n", parts_of_one}}).find("without a comma"), std::string::npos) << parts_of_one;
+  for (const char* some : {"10 kPa,20", "10 kPa, 20, 30", "10 kPa,20,auto"})
+    EXPECT_NE(fault({{"normal_stress", some}}).find("has a unit and"), std::string::npos) << some;
+  EXPECT_EQ(plan_sweep({{"normal_stress", "12,500 Pa"}, {"seed", "1,2"}}).understood,
+            "normal_stress = 12 Pa, 500 Pa; seed = 1, 2");
 }
 
 class Sweep : public Program {
@@ -174,9 +218,28 @@ TEST_F(Sweep, SaysWhatIsWrongBeforeAnythingRuns) {
   expect_fault("normal_stres=1,2 kPa", {"--set normal_stres=1 kPa", "unknown key"});
   expect_fault("mu_s=0.3,0.4", {"contact.mu_s", "stage.mu_s"});
   expect_fault("seed=1,-1", {"--set seed=-1", "expected >= 0"});
+  // By what stands in case.toml, by its grains, by its stages, and by the machine.
+  expect_fault("normal_stress=1 kPa,12 50 Pa", {"understood the number 12 and the unit \"50 Pa\""});
+  expect_fault("box.x=0,0.1", {"x-0.1: the grains overlap at the start"});
+  expect_fault("stage.settle.wall_gamma_n=1,1e4",
+               {"wall_gamma_n-1e4: stage settle: wall_gamma_n = 10000", "unstable"});
+  expect_fault("count=100,2e9", {"grains.count = 2000000000", "GB", "expected at most"});
   EXPECT_FALSE(fs::exists(small / "sweep"));
 
   ASSERT_EQ(moraine(to_sweep(small, "seed=1,3")).status, 0);
+  const std::string written = contents(small / "sweep/seed-1/case.toml");
+  for (const char* seeds : {"seed=1,3", "seed=1,4"}) {
+    const Outcome o = moraine(to_sweep(small, seeds, {"--resume", "--set", "contact.mu_s=0.4"}));
+    EXPECT_EQ(o.status, 1);
+    EXPECT_NE(
+        o.err.find(
+            "sweep/seed-1: holds results of another version of this case: contact.mu_d was 0.5 and is now "
+            "0.4; contact.mu_s was 0.5 and is now 0.4"),
+        std::string::npos)
+        << o.err;
+    EXPECT_EQ(contents(small / "sweep/seed-1/case.toml"), written);
+    EXPECT_FALSE(fs::exists(small / "sweep/seed-4"));
+  }
   expect_fault("seed=1,2", {"sweep/seed-1/output", "--resume", "--force"});
   EXPECT_FALSE(fs::exists(small / "sweep/seed-2"));
 }
