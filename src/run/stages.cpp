@@ -8,6 +8,7 @@
 #include "dem/packing.hpp"
 #include "error.hpp"
 #include "output/files.hpp"
+#include "output/sealed.hpp"
 #include "run/schedule.hpp"
 
 namespace moraine::run {
@@ -68,6 +69,17 @@ void set_top_wall(const cases::Case& c, const cases::Stage& stage, const Start& 
   wall.frequency = stage.normal_stress_frequency, wall.phase = stage.normal_stress_phase;
 }
 
+output::Checkpoint read_start(const std::filesystem::path& path) {
+  try {
+    return output::read_checkpoint(path);
+  } catch (const output::Damaged& e) {
+    throw error(
+        e.what(),
+        "; expected an undamaged copy, or run the case it comes from again: --resume does that from its "
+        "checkpoint before");
+  }
+}
+
 }  // namespace
 
 double mean_diameter(const dem::State& s) {
@@ -84,10 +96,11 @@ double step_by_eq_9(const dem::Scene& scene, const dem::State& s, double f) {
 
 Start start_of(const cases::Case& c) {
   if (!c.start.empty()) {
-    output::Checkpoint before = output::read_checkpoint(c.start);
+    output::Checkpoint before = read_start(c.start);
     dem::synchronise(before.scene, before.state);
     if (!before.finished)
       throw error(c.start.string(), ": the case it belongs to has not finished; run it to its end first");
+    if (before.state.r.empty()) throw error(c.start.string(), ": has no grains");
     Start s{std::move(before.state), before.scene.box.x,         before.scene.box.y,
             before.scene.box.z,      before.scene.top_wall.mass, std::move(before.water)};
     if (c.box_x > 0) s.box_x = c.box_x;
