@@ -13,7 +13,7 @@ import stat
 import h5py
 
 size = 512
-patience = 10  # s, for a file without a seal; a series takes some milliseconds
+patience = 5  # s, for a file without a seal; a series takes some milliseconds
 
 
 class MissingData(Exception):

@@ -370,8 +370,10 @@ void write_checkpoint(const std::filesystem::path& path, const Checkpoint& check
 Checkpoint read_checkpoint(const std::filesystem::path& path) {
   const Sealed found = read_sealed(path);
   const auto fail = [&](const auto&... parts) { throw error(path.string(), ": ", parts...); };
-  const bool without_seal =
-      found.bytes.starts_with("\x89HDF") && found.bytes.find("stage_start_time") != found.bytes.npos;
+  // Earlier files begin with HDF5 itself; what has lost its seal says, at byte 24, that one stood before it.
+  const bool without_seal = found.bytes.starts_with("\x89HDF") &&
+                            found.bytes.find("stage_start_time") != found.bytes.npos &&
+                            found.bytes.compare(24, 8, std::string(8, '\0')) == 0;
   if (without_seal)
     fail(
         "written by an earlier version of moraine (checkpoint format 4 or before, which has no checksum; "

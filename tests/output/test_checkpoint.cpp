@@ -209,13 +209,16 @@ TEST_F(CheckpointFile, FindsEveryDamage) {
 
 TEST_F(CheckpointFile, RefusesAnotherFormat) {
   write_checkpoint(path, sample(2));
-  const std::string hdf5 = contents(path).substr(seal_size);
+  std::string hdf5 = contents(path).substr(seal_size);
   reseal(1000);
   EXPECT_EQ(
       why_not(),
       path.string() + ": written by a later version of moraine (checkpoint format 1000; this one reads 5)");
 
-  directory.write("checkpoint.h5", hdf5);  // as formats before 5 were
+  directory.write("checkpoint.h5", hdf5);  // has lost its seal
+  EXPECT_THROW(read_checkpoint(path), Damaged);
+  hdf5[25] = 0;  // as formats before 5 were
+  directory.write("checkpoint.h5", hdf5);
   EXPECT_TRUE(
       contains(why_not(), path.string() + ": written by an earlier version of moraine (checkpoint format 4"))
       << why_not();

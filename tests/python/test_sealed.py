@@ -90,7 +90,7 @@ def test_a_reader_that_dies_is_told(tmp_path):
     file = tmp_path / "old.h5"
     h5py.File(file, "w").close()
     with pytest.raises(MissingData, match="old.h5: damaged: HDF5 dies of reading it"):
-        sealed.read(file, lambda h5: os.kill(os.getpid(), 11))
+        sealed.read(file, lambda h5: os.kill(os.getpid(), 9))
 
 
 @pytest.mark.parametrize("make", [os.mkdir, os.mkfifo, lambda f: os.symlink(f, f)])
