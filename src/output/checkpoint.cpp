@@ -361,8 +361,6 @@ void write_checkpoint(const std::filesystem::path& path, const Checkpoint& check
                       const std::filesystem::path& before) {
   const hdf5::Lock lock;
   const auto file = hdf5::File::in_memory(path);
-  file.set("program", std::string("moraine"));
-  file.set("format", format);  // also here: versions that knew no seal look for it
   for_each_member<Checkpoint>([&](const char* name, auto pointer) { put(file, name, checkpoint.*pointer); });
   write_text(path, file.sealed(kind, format), before);
 }

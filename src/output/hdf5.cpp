@@ -58,8 +58,8 @@ Handle access_list(H5F_libver_t format) {
 
 Handle string_type(std::size_t size) {
   Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
-  H5Tset_size(type, std::max<std::size_t>(size, 1));
-  H5Tset_strpad(type, H5T_STR_NULLPAD);
+  H5Tset_size(type, size);
+  if (size != H5T_VARIABLE) H5Tset_strpad(type, H5T_STR_NULLPAD);
   H5Tset_cset(type, H5T_CSET_UTF8);
   return type;
 }
@@ -173,10 +173,11 @@ void Group::read(const std::string& name, std::string& text) const {
 
 void Group::label(hid_t object, const std::string& name, const std::string& attribute,
                   const std::string& text) const {
-  const Handle type = string_type(text.size()), shape = scalar();
+  const Handle type = string_type(H5T_VARIABLE), shape = scalar();  // h5py gives str, of a fixed length bytes
   const hid_t id = H5Acreate2(object, attribute.c_str(), type, shape, H5P_DEFAULT, H5P_DEFAULT);
   const Handle handle(check(id, name, "create an attribute"), H5Aclose);
-  check(H5Awrite(handle, type, text.c_str()), name, "write an attribute");
+  const char* value = text.c_str();
+  check(H5Awrite(handle, type, &value), name, "write an attribute");
 }
 
 void Group::set_attribute(const std::string& name, Element element, const void* value) const {

@@ -1,7 +1,8 @@
 // A thin layer over the HDF5 C library: handles close themselves, and a failure becomes an Error that names
 // the file, the object in it and the cause. No time stamps: equal content gives equal bytes. File locks are
-// off: the lock of a reader would stop a writer, and some file systems have none. Texts have a fixed length:
-// of damaged ones of variable length the library makes wild pointers. Any HDF5 from 1.10 on reads the files.
+// off: the lock of a reader would stop a writer, and some file systems have none. Texts have a fixed length,
+// since of damaged ones of variable length the library makes wild pointers; labels, which the program never
+// reads back, are variable. Any HDF5 from 1.10 on reads the files.
 #pragma once
 #include <hdf5.h>
 
