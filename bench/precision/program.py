@@ -1,10 +1,15 @@
 """Moraine as a program: a case written, run on one thread, and what it left read back."""
 import os
+from pathlib import Path
 import resource
 import subprocess
+import sys
 
 import h5py
 import numpy as np
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "python"))
+from moraine.sealed import seal  # noqa: E402
 
 
 class Failed(Exception):
@@ -78,4 +83,5 @@ duration = 1e-9
             state[name][:] = 0 if values is None else np.asarray(values, float)[order]
         state.attrs["staggered"] = np.array(0, state.attrs["staggered"].dtype)
         state.attrs["wall_z"] = wall
+    seal(path)
     return path

@@ -16,9 +16,7 @@ import tomllib
 import h5py
 import numpy as np
 
-
-class MissingData(Exception):
-    """A file or dataset that an analysis needs is not there; the message names it and says what would help."""
+from .sealed import MissingData, is_sealed, read
 
 
 class Table:
@@ -48,27 +46,19 @@ class Table:
         return Table(self.file, {name: column[which] for name, column in self.columns.items()}, self.units)
 
 
-def _open(file, **how):
-    try:
-        return h5py.File(file, "r", **how)
-    except FileNotFoundError:
-        raise MissingData(f"there is no {file}") from None
-    except OSError as why:
-        raise MissingData(f"{file}: cannot be read as HDF5: {why}") from None
-
-
 def _table(file, h5, name="/"):
     """Of the group `name` of an open file."""
-    try:
-        group = h5.get(name)
-        if not isinstance(group, h5py.Group):
-            raise MissingData(f"{h5.filename}: there is no group {name}")
-        datasets = {name: d for name, d in group.items() if isinstance(d, h5py.Dataset)}
-        units = {name: d.attrs.get("units", b"") for name, d in datasets.items()}
-        units = {name: u.decode() if isinstance(u, bytes) else str(u) for name, u in units.items()}
-        return Table(file, {name: d[()] for name, d in datasets.items()}, units)
-    except (OSError, RuntimeError, KeyError) as why:  # as HDF5 finds it damaged
-        raise MissingData(f"{file}: cannot be read: {why}") from None
+    group = h5.get(name)
+    if not isinstance(group, h5py.Group):
+        raise MissingData(f"{file}: there is no group {name}")
+    datasets = {name: d for name, d in group.items() if isinstance(d, h5py.Dataset)}
+    units = {name: d.attrs.get("units", b"") for name, d in datasets.items()}
+    units = {name: u.decode() if isinstance(u, bytes) else str(u) for name, u in units.items()}
+    return Table(file, {name: d[()] for name, d in datasets.items()}, units)
+
+
+def _numbers(values):
+    return np.array(values, float)
 
 
 class Snapshot:
@@ -81,18 +71,45 @@ class Snapshot:
 
     def __init__(self, file):
         self.file = Path(file)
-        with _open(self.file) as h5:
+
+    @cached_property
+    def _sealed(self):
+        return is_sealed(self.file)
+
+    def _attributes(self, group, problem, **types):
+        def take(h5):
             try:
-                self.time = float(h5.attrs["time"])              # s, since the case began
-                self.stage_time = float(h5.attrs["stage_time"])  # s
-                self.box = np.array(h5.attrs["box"], float)      # m; x and y are the periodic sides
-                self.top_wall = float(h5.attrs["top_wall"])      # m; its height
+                return {name: kind(h5[group].attrs[name]) for name, kind in types.items()}
             except KeyError as why:
-                raise MissingData(f"{self.file}: not a snapshot of Moraine: {why}") from None
+                raise MissingData(f"{self.file}: {problem}: {why}") from None
+        return read(self.file, take, self._sealed)
+
+    @cached_property
+    def _about(self):
+        return self._attributes("/", "not a snapshot of Moraine", time=float, stage_time=float, box=_numbers, top_wall=float)
+
+    @property
+    def time(self):
+        """s, since the case began"""
+        return self._about["time"]
+
+    @property
+    def stage_time(self):
+        """s"""
+        return self._about["stage_time"]
+
+    @property
+    def box(self):
+        """m; x and y are the periodic sides"""
+        return self._about["box"]
+
+    @property
+    def top_wall(self):
+        """m; its height"""
+        return self._about["top_wall"]
 
     def _group(self, name):
-        with _open(self.file) as h5:
-            table = _table(f"{self.file}:/{name}", h5, name)
+        table = read(self.file, lambda h5: _table(f"{self.file}:/{name}", h5, name), self._sealed)
         if len({len(column) for column in table.columns.values()}) > 1:
             raise MissingData(f"{table.file}: the datasets differ in length")
         return table
@@ -115,12 +132,8 @@ class Snapshot:
     @cached_property
     def water_grid(self):
         """Cells along x, y, z, and the sides of the grid, m; its top is that of the bed, and it follows that."""
-        with _open(self.file) as h5:
-            try:
-                group = h5["water"].attrs
-                return tuple(int(group[f"cells_{axis}"]) for axis in "xyz"), np.array(group["size"], float)
-            except KeyError as why:
-                raise MissingData(f"{self.file}: there is no water in it: {why}") from None
+        found = self._attributes("water", "there is no water in it", cells_x=int, cells_y=int, cells_z=int, size=_numbers)
+        return (found["cells_x"], found["cells_y"], found["cells_z"]), found["size"]
 
     @property
     def area(self):
@@ -183,6 +196,8 @@ class Case:
             what = "has no results yet; run it first: ./moraine run" if (self.directory / "case.toml").exists() else \
                 "is no case directory, which would hold a case.toml:"
             raise MissingData(f"{self.directory} {what} {self.directory}") from None
+        except OSError as why:
+            raise MissingData(f"{self.output}/case.toml: cannot be read: {why.strerror or why}") from None
         try:
             self.settings = tomllib.loads(self.text)
             self.stages = [Stage(self, k, s) for k, s in enumerate(self.settings["stage"])]
@@ -200,8 +215,8 @@ class Case:
     def read_series(self):
         """The whole series as it is now; `series` keeps what it has once read."""
         file = self.output / "series.h5"
-        with _open(file, swmr=True, locking=False) as h5:  # a lock, however short, could make a run that resumes fail
-            table = _table(file, h5)
+        # A lock, however short, could make a run that resumes fail.
+        table = read(file, lambda h5: _table(file, h5), swmr=True, locking=False)
         length = min((len(c) for c in table.columns.values()), default=0)  # a row may be on its way
         return table.rows(slice(length))
 

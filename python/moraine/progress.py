@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 
-from . import case as cases
+from . import case as cases, sealed
 from .case import MissingData
 
 window = 300  # s of the clock over which the pace of a run is measured
@@ -41,17 +41,19 @@ class Progress:
             raise MissingData(f"{self.directory} is no case directory: there is no {self.directory}/case.toml")
         self.case, self.series, self.stage, self.own = None, (), None, ()
         self._stamp = None
+        self._finished = 0.0, False  # as _checkpoint() returns it
         self._seen = deque()  # (clock, model time, rows), of this stage
 
     def look(self):
         """Reads what there is now. True if rows have come, or gone."""
-        for patience in (0.1, 0.2, 0.4, 0.8, None):  # files that are being written, or replaced, may be out of step for a moment
+        began = time.monotonic()
+        for pause in (0.1, 0.2, 0.4, 0.8, None):  # files that are being written, or replaced, may be out of step for a moment
             try:
                 return self._look()
             except MissingData:
-                if patience is None:
+                if pause is None or time.monotonic() > began + 2:
                     raise
-                time.sleep(patience)
+                time.sleep(pause)
 
     def _look(self):
         try:
@@ -141,10 +143,12 @@ class Progress:
         """(when written, whether it says that the case has finished)"""
         file = self.output / "checkpoint.h5"
         try:
-            with cases._open(file, locking=False) as h5:
-                return file.stat().st_mtime, bool(h5.attrs["finished"])
-        except (MissingData, KeyError, OSError):
+            written = file.stat().st_mtime
+            if written != self._finished[0]:  # it may be large, and must be read whole
+                self._finished = written, sealed.read(file, lambda h5: bool(h5.attrs["finished"]), locking=False)
+        except (MissingData, OSError):
             return 0.0, False
+        return self._finished
 
     def silence(self):
         """Seconds since the last row, and whether that is much longer than usual."""

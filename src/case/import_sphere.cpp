@@ -25,9 +25,10 @@ static_assert(std::endian::native == std::endian::little, "sphere binaries are r
 
 class Binary {
  public:
-  explicit Binary(const fs::path& path) : path_(path.string()), file_(path, std::ios::binary) {
-    if (!fs::is_regular_file(path) || !file_)
-      throw error(path_, ": cannot be read; expected a sphere binary");
+  explicit Binary(const fs::path& path) : path_(path.string()) {
+    std::error_code failed;
+    if (fs::is_regular_file(path, failed)) file_.open(path, std::ios::binary);  // a pipe would be waited for
+    if (!file_.is_open()) throw error(path_, ": cannot be read; expected a sphere binary");
     left_ = fs::file_size(path);
   }
 

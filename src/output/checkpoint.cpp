@@ -1,5 +1,5 @@
-// The file mirrors the structs: numbers are attributes, lists are datasets, structs and lists of structs are
-// groups. Units and meanings are those of scene.hpp and state.hpp.
+// The file mirrors the structs: numbers are attributes, lists and texts are datasets, structs and lists of
+// structs are groups. Units and meanings are those of scene.hpp and state.hpp.
 #include <algorithm>
 #include <array>
 #include <tuple>
@@ -7,6 +7,7 @@
 #include "error.hpp"
 #include "output/files.hpp"
 #include "output/hdf5.hpp"
+#include "output/sealed.hpp"
 
 namespace moraine::output {
 
@@ -15,6 +16,7 @@ inline constexpr bool hdf5::all_doubles<Row> = true;
 
 namespace {
 
+constexpr const char* kind = "checkpoint";
 constexpr std::int64_t format = 5;  // raise it with every change to a struct below
 
 // Every member of every stored struct, once, for writing and for reading. A new member is one more line; one
@@ -302,6 +304,8 @@ void put(const hdf5::Group& group, const char* name, const T& value) {
     for_each_member<T>([&](const char* member, auto pointer) { put(inner, member, value.*pointer); });
   } else if constexpr (std::same_as<T, bool>) {
     group.set(name, std::uint8_t{value});
+  } else if constexpr (std::same_as<T, std::string>) {
+    group.write(name, value);
   } else {
     group.set(name, value);
   }
@@ -353,6 +357,8 @@ void get(const hdf5::Group& group, const char* name, T& value) {
     std::uint8_t number = 0;
     group.get(name, number);
     value = number != 0;
+  } else if constexpr (std::same_as<T, std::string>) {
+    group.read(name, value);
   } else {
     group.get(name, value);
     check_enumeration(group, name, value);
@@ -415,31 +421,33 @@ void validate(const std::string& file, const Checkpoint& c) {
 
 }  // namespace
 
-void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint) {
+void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint,
+                      const std::filesystem::path& before) {
   const hdf5::Lock lock;
   const auto file = hdf5::File::in_memory(path);
-  file.set("program", std::string("moraine"));
-  file.set("format", format);
   for_each_member<Checkpoint>([&](const char* name, auto pointer) { put(file, name, checkpoint.*pointer); });
-  file.save();
+  write_text(path, file.sealed(kind, format), before);
 }
 
 Checkpoint read_checkpoint(const std::filesystem::path& path) {
+  const Sealed found = read_sealed(path);
+  const auto fail = [&](const auto&... parts) { throw error(path.string(), ": ", parts...); };
+  // Earlier files begin with HDF5 itself; what has lost its seal says, at byte 24, that one stood before it.
+  const bool without_seal = found.bytes.starts_with("\x89HDF") &&
+                            found.bytes.find("stage_start_time") != found.bytes.npos &&
+                            found.bytes.compare(24, 8, std::string(8, '\0')) == 0;
+  if (without_seal)
+    fail(
+        "written by an earlier version of moraine (checkpoint format 4 or before, which has no checksum; "
+        "this one reads ",
+        format, "); run its case again");
+  if (found.kind != kind) throw Damaged(path.string() + ": not a checkpoint of moraine, or damaged");
+  if (found.format != format)
+    fail("written by ", found.format > format ? "a later" : "an earlier",
+         " version of moraine (checkpoint format ", found.format, "; this one reads ", format, ")",
+         found.format > format ? "" : "; run its case again");
   const hdf5::Lock lock;
-  const auto file = hdf5::File::open(path, H5F_ACC_RDONLY);
-  std::string program;
-  std::int64_t found = 0;
-  if (file.has("program")) file.get("program", program);
-  if (program != "moraine" || !file.has("format")) throw error(file.where(), ": not a checkpoint of moraine");
-  file.get("format", found);
-  if (found > format) {
-    throw error(file.where(), ": written by a later version of moraine (checkpoint format ", found,
-                "; this one reads ", format, ")");
-  }
-  if (found < format) {
-    throw error(file.where(), ": written by an earlier version of moraine (checkpoint format ", found,
-                "; this one reads ", format, "); run its case again");
-  }
+  const auto file = hdf5::File::from_memory(path, found.bytes);
   Checkpoint checkpoint;
   for_each_member<Checkpoint>([&](const char* name, auto pointer) { get(file, name, checkpoint.*pointer); });
   validate(file.where(), checkpoint);

@@ -87,7 +87,7 @@ SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::s
                             const std::optional<coupling::WaterFields>& water = {});
 // snapshots/grains.xdmf and snapshots/contacts.xdmf: time series for ParaView (XDMF 3, Polyvertex with a
 // radius; contacts as points with force vectors). With pore water also water.xdmf, the grid's cells, and
-// bed.xdmf, grains and grid together. Rewritten whole.
+// bed.xdmf, grains and grid together. Rewritten whole; of snapshots of one time it lists the last.
 void write_xdmf(const std::filesystem::path& directory, const std::vector<SnapshotInfo>& snapshots);
 
 // What a stage began with: the rows of the series count from here.
@@ -106,7 +106,7 @@ struct StageStart {
 struct Checkpoint {
   std::string case_text;  // resolved case
   std::string version;
-  std::int64_t stage = 0;  // index; == number of stages when the case has finished
+  std::int64_t stage = 0;  // index
   StageStart start;        // of the stage
   double height_0 = 0;     // m, H_0: of the bed when the stage, or the shear that it carries on, began
   // With dt = "auto": the critical step of the contact network, s, and the step of the clock it was found at.
@@ -120,9 +120,12 @@ struct Checkpoint {
   std::vector<Row> rows;
   std::vector<SnapshotInfo> snapshots;
 };
-void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint);
-// Throws Error naming the file and what is wrong: missing, no HDF5 file, truncated, not of this program, of a
-// later version.
+// What stood there before is kept as BEFORE, where that is given. Between two renames PATH is missing for a
+// moment.
+void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint,
+                      const std::filesystem::path& before = {});
+// Throws Error naming the file and what is wrong: not to be opened, of another version, no state; or Damaged
+// (sealed.hpp): missing, truncated, not the bytes that were written, not of this program.
 Checkpoint read_checkpoint(const std::filesystem::path& path);
 
 // Keeps other runs off a directory while this one writes there. The system lets go of it however a process
@@ -139,7 +142,8 @@ class DirectoryLock {
 };
 
 // Writes text (or any bytes) aside, waits until the disk has it, and renames it. Throws Error (path, cause:
-// disk full, permission), and then leaves what stood there before.
-void write_text(const std::filesystem::path& path, std::string_view text);
+// disk full, permission), and then leaves what stood there before; that is renamed to BEFORE, where given.
+void write_text(const std::filesystem::path& path, std::string_view text,
+                const std::filesystem::path& before = {});
 
 }  // namespace moraine::output

@@ -1,12 +1,12 @@
 #include "output/hdf5.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <cstring>
-#include <iterator>
 
 #include "error.hpp"
-#include "output/files.hpp"
+#include "output/sealed.hpp"
 
 namespace moraine::output::hdf5 {
 namespace {
@@ -50,12 +50,16 @@ Handle access_list(H5F_libver_t format) {
   Handle list = property_list(H5P_FILE_ACCESS);
   H5Pset_libver_bounds(list, format, H5F_LIBVER_V110);
   H5Pset_file_locking(list, false, true);
+  // Of a file that grows, what does not fit its checksum is read again after pauses that double from a
+  // nanosecond on: by default 100 times, which is for ever on a damaged one.
+  H5Pset_metadata_read_attempts(list, 25);
   return list;
 }
 
-Handle string_type() {
+Handle string_type(std::size_t size) {
   Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
-  H5Tset_size(type, H5T_VARIABLE);
+  H5Tset_size(type, size);
+  if (size != H5T_VARIABLE) H5Tset_strpad(type, H5T_STR_NULLPAD);
   H5Tset_cset(type, H5T_CSET_UTF8);
   return type;
 }
@@ -70,17 +74,8 @@ Handle space(const std::vector<hsize_t>& extent, const std::vector<hsize_t>& mos
 
 Handle scalar() { return Handle(H5Screate(H5S_SCALAR), H5Sclose); }
 
-// HDF5 hands out strings from its own heap.
-std::string take(char* text) {
-  std::string copy = text ? text : "";
-  H5free_memory(text);
-  return copy;
-}
-
 bool same_kind(hid_t type, hid_t expected) {
-  return H5Tget_class(type) == H5Tget_class(expected) &&
-         (H5Tget_class(type) == H5T_STRING ? H5Tis_variable_str(type) > 0
-                                           : H5Tget_size(type) == H5Tget_size(expected));
+  return H5Tget_class(type) == H5Tget_class(expected) && H5Tget_size(type) == H5Tget_size(expected);
 }
 
 }  // namespace
@@ -145,25 +140,40 @@ void Group::read_dataset(hid_t dataset, const std::string& name, Element element
 }
 
 void Group::write(const std::string& name, const std::vector<std::string>& rows) const {
-  const Handle type = string_type();
-  std::vector<const char*> texts;
-  for (const std::string& row : rows) texts.push_back(row.c_str());
+  std::size_t longest = 1;
+  for (const std::string& row : rows) longest = std::max(longest, row.size());
+  std::string table;
+  for (const std::string& row : rows) table += row + std::string(longest - row.size(), '\0');
+  const Handle type = string_type(longest);
   const Handle dataset = create_dataset(name, {type}, rows.size());
-  write_dataset(dataset, name, {type}, texts.data());
+  write_dataset(dataset, name, {type}, table.data());
 }
 
 void Group::read(const std::string& name, std::vector<std::string>& rows) const {
-  const Handle type = string_type();
   const Handle dataset = open_dataset(name);
-  std::vector<char*> texts(size(dataset, name, {type}));
-  read_dataset(dataset, name, {type}, texts.data());
+  const Handle type(check(H5Dget_type(dataset), name, "read the type"), H5Tclose);
+  if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0)
+    throw error(where(name), ": not a column of texts of a fixed length");
+  const std::size_t length = H5Tget_size(type), count = size(dataset, name, {type});
+  std::string table(count * length, '\0');
+  read_dataset(dataset, name, {type}, table.data());
   rows.clear();
-  for (char* text : texts) rows.push_back(take(text));
+  for (std::size_t k = 0; k < count; ++k)
+    rows.push_back(table.substr(k * length, length)), rows.back().resize(std::strlen(rows.back().c_str()));
+}
+
+void Group::write(const std::string& name, const std::string& text) const { write(name, std::vector{text}); }
+
+void Group::read(const std::string& name, std::string& text) const {
+  std::vector<std::string> rows;
+  read(name, rows);
+  if (rows.size() != 1) throw error(where(name), ": ", rows.size(), " texts, 1 expected");
+  text = rows[0];
 }
 
 void Group::label(hid_t object, const std::string& name, const std::string& attribute,
                   const std::string& text) const {
-  const Handle type = string_type(), shape = scalar();
+  const Handle type = string_type(H5T_VARIABLE), shape = scalar();  // h5py gives str, of a fixed length bytes
   const hid_t id = H5Acreate2(object, attribute.c_str(), type, shape, H5P_DEFAULT, H5P_DEFAULT);
   const Handle handle(check(id, name, "create an attribute"), H5Aclose);
   const char* value = text.c_str();
@@ -188,13 +198,6 @@ void Group::get_attribute(const std::string& name, Element element, void* value)
   check(H5Aread(attribute, element.type, value), name, "read the attribute");
 }
 
-void Group::get(const std::string& name, std::string& value) const {
-  char* text = nullptr;
-  const Handle type = string_type();
-  get_attribute(name, {type}, &text);
-  value = take(text);
-}
-
 File File::create(const std::filesystem::path& path) {
   start_library();
   const Handle creation = without_times(H5P_FILE_CREATE), access = access_list(H5F_LIBVER_V110);
@@ -209,8 +212,20 @@ File File::in_memory(const std::filesystem::path& path) {
   // formats.
   const Handle creation = without_times(H5P_FILE_CREATE), access = access_list(H5F_LIBVER_EARLIEST);
   H5Pset_fapl_core(access, std::size_t{1} << 20, false);
+  H5Pset_userblock(creation, seal_size);
   const hid_t id = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation, access);
   if (id < 0) throw error(path.string(), ": cannot make an HDF5 file in memory: ", cause());
+  return File(Handle(id, H5Fclose), path.string(), "");
+}
+
+File File::from_memory(const std::filesystem::path& path, const std::string& bytes) {
+  start_library();
+  const Handle access = access_list(H5F_LIBVER_EARLIEST);
+  H5Pset_fapl_core(access, std::size_t{1} << 20, false);
+  H5Pset_file_image(access, const_cast<char*>(bytes.data()), bytes.size());  // which it copies
+  // The name of an image must be one that no file can have.
+  const hid_t id = H5Fopen("/dev/null/image", H5F_ACC_RDONLY, access);
+  if (id < 0) throw error(path.string(), ": cannot open the file: ", cause());
   return File(Handle(id, H5Fclose), path.string(), "");
 }
 
@@ -228,12 +243,13 @@ File File::open(const std::filesystem::path& path, unsigned flags) {
 
 void File::flush() const { check(H5Fflush(id_, H5F_SCOPE_LOCAL), {}, "write"); }
 
-void File::save() const {
+std::string File::sealed(const std::string& kind, std::int64_t format) const {
   flush();
   const auto size = static_cast<std::size_t>(check(H5Fget_file_image(id_, nullptr, 0), {}, "take the image"));
-  std::string image(size, '\0');
-  check(H5Fget_file_image(id_, image.data(), size), {}, "take the image");
-  write_text(file_, image);
+  std::string image(seal_size + size, '\0');  // HDF5 leaves the user block out
+  check(H5Fget_file_image(id_, image.data() + seal_size, size), {}, "take the image");
+  seal(image, kind, format);
+  return image;
 }
 
 }  // namespace moraine::output::hdf5

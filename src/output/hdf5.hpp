@@ -1,7 +1,8 @@
 // A thin layer over the HDF5 C library: handles close themselves, and a failure becomes an Error that names
 // the file, the object in it and the cause. No time stamps: equal content gives equal bytes. File locks are
-// off: the lock of a reader would stop a writer, and some file systems have none. Any HDF5 from 1.10 on reads
-// the files.
+// off: the lock of a reader would stop a writer, and some file systems have none. Texts have a fixed length,
+// since of damaged ones of variable length the library makes wild pointers; labels, which the program never
+// reads back, are variable. Any HDF5 from 1.10 on reads the files.
 #pragma once
 #include <hdf5.h>
 
@@ -87,6 +88,7 @@ class Group {
     if (units) label(dataset, name, "units", units);
   }
   void write(const std::string& name, const std::vector<std::string>& rows) const;
+  void write(const std::string& name, const std::string& text) const;
   template <class T>
   void read(const std::string& name, std::vector<T>& rows) const {
     const Handle dataset = open_dataset(name);
@@ -94,6 +96,7 @@ class Group {
     read_dataset(dataset, name, element<T>(), rows.data());
   }
   void read(const std::string& name, std::vector<std::string>& rows) const;
+  void read(const std::string& name, std::string& text) const;
 
   // Attributes of the group
   template <class T>
@@ -105,9 +108,7 @@ class Group {
   void get(const std::string& name, T& value) const {
     get_attribute(name, element<T>(), &value);
   }
-  void get(const std::string& name, std::string& value) const;
   bool holds(const std::string& name) const { return H5Lexists(id_, name.c_str(), H5P_DEFAULT) > 0; }
-  bool has(const std::string& attribute) const { return H5Aexists(id_, attribute.c_str()) > 0; }
 
   // Steps of the above, for datasets that grow: chunk = 0 is a fixed size
   Handle create_dataset(const std::string& name, Element element, hsize_t rows, hsize_t chunk = 0) const;
@@ -139,9 +140,12 @@ class File : public Group {
   static File create(const std::filesystem::path& path);
   void flush() const;
 
-  // A file made in memory and then saved whole by write_text: what the disk refuses cannot leave half a file.
+  // A file made in memory and then written whole, with a seal (sealed.hpp) in front: what the disk refuses
+  // cannot leave half a file.
   static File in_memory(const std::filesystem::path& path);
-  void save() const;
+  std::string sealed(const std::string& kind, std::int64_t format) const;
+  // Of the bytes of such a file; the path serves messages.
+  static File from_memory(const std::filesystem::path& path, const std::string& bytes);
 
  private:
   using Group::Group;

@@ -2,6 +2,7 @@
 #include <charconv>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <numeric>
 #include <sstream>
 
@@ -182,6 +183,17 @@ void write_grid(std::ostream& text, const Cloud& cloud, const SnapshotInfo& snap
   text << "</Grid>\n";
 }
 
+// Readers want times that rise. Where a stage ends and the next begins there are two snapshots of one time:
+// the later one is what goes on from there.
+std::vector<SnapshotInfo> one_for_each_time(const std::vector<SnapshotInfo>& snapshots) {
+  std::vector<SnapshotInfo> listed;
+  for (const SnapshotInfo& s : snapshots) {
+    if (!listed.empty() && listed.back().time >= s.time) listed.pop_back();
+    listed.push_back(s);
+  }
+  return listed;
+}
+
 std::string xdmf(const Cloud& cloud, const std::vector<SnapshotInfo>& snapshots) {
   std::ostringstream text;
   text << "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Xdmf Version=\"3.0\">\n<Domain>\n"
@@ -220,7 +232,6 @@ std::string wet_xdmf(const std::vector<SnapshotInfo>& snapshots, bool with_grain
   text << "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Xdmf Version=\"3.0\">\n<Domain>\n"
        << "<Grid Name=\"steps\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
   for (const SnapshotInfo& s : snapshots) {
-    if (s.water_x == 0) continue;
     if (with_grains)
       text << "<Grid Name=\"bed\" GridType=\"Collection\" CollectionType=\"Spatial\"><Time Value=\""
            << shortest(s.time) << "\"/>\n";
@@ -250,18 +261,21 @@ SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::s
   write_grains(file.create_group("grains"), scene, staggered);
   info.contacts = write_contacts(file.create_group("contacts"), scene, staggered);
   if (water) write_water(file.create_group("water"), *water, info);
-  file.save();
+  write_text(directory / info.file, file.sealed("snapshot", 1));
   return info;
 }
 
 void write_xdmf(const std::filesystem::path& directory, const std::vector<SnapshotInfo>& snapshots) {
   for (const Cloud& cloud : clouds) {
-    write_text(directory / (std::string(cloud.group) + ".xdmf"), xdmf(cloud, snapshots));
+    write_text(directory / (std::string(cloud.group) + ".xdmf"), xdmf(cloud, one_for_each_time(snapshots)));
   }
-  if (std::none_of(snapshots.begin(), snapshots.end(), [](const SnapshotInfo& s) { return s.water_x > 0; }))
-    return;
-  write_text(directory / "water.xdmf", wet_xdmf(snapshots, false));
-  write_text(directory / "bed.xdmf", wet_xdmf(snapshots, true));
+  std::vector<SnapshotInfo> wet;
+  std::copy_if(snapshots.begin(), snapshots.end(), std::back_inserter(wet),
+               [](const SnapshotInfo& s) { return s.water_x > 0; });
+  if (wet.empty()) return;
+  wet = one_for_each_time(wet);
+  write_text(directory / "water.xdmf", wet_xdmf(wet, false));
+  write_text(directory / "bed.xdmf", wet_xdmf(wet, true));
 }
 
 }  // namespace moraine::output

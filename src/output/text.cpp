@@ -10,7 +10,8 @@
 
 namespace moraine::output {
 
-void write_text(const std::filesystem::path& path, std::string_view text) {
+void write_text(const std::filesystem::path& path, std::string_view text,
+                const std::filesystem::path& before) {
   const std::filesystem::path aside = path.string() + ".tmp";
   int file = -1;
   const auto check = [&](auto result, const char* action) {
@@ -31,6 +32,8 @@ void write_text(const std::filesystem::path& path, std::string_view text) {
     text.remove_prefix(static_cast<std::size_t>(written));
   }
   check(::fsync(file), "write");
+  if (!before.empty() && std::rename(path.c_str(), before.c_str()) < 0 && errno != ENOENT)
+    check(-1, "rename the file that stood there");
   check(std::rename(aside.c_str(), path.c_str()), "replace the file");
   ::close(file);
 

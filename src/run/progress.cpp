@@ -37,7 +37,10 @@ void Screen::clear_line() {
 }
 
 void Screen::say(const std::string& line) {
-  if (quiet_) return;
+  if (!quiet_) warn(line);
+}
+
+void Screen::warn(const std::string& line) {
   clear_line();
   std::cerr << line << std::endl;
 }
@@ -62,6 +65,11 @@ Progress::Progress(const std::filesystem::path& log, bool append, bool quiet)
 void Progress::say(const std::string& line) {
   log_ << line << std::endl;
   screen_.say(line);
+}
+
+void Progress::warn(const std::string& line) {
+  log_ << line << std::endl;
+  screen_.warn(line);
 }
 
 void Progress::log(const std::string& lines) { log_ << lines << std::flush; }

@@ -14,6 +14,7 @@ class Screen {
   explicit Screen(bool quiet);
   ~Screen();
   void say(const std::string& line);   // stays
+  void warn(const std::string& line);  // stays, even if quiet
   void show(const std::string& line);  // refreshes on a terminal
   bool due() const;                    // for the next `show`
 
@@ -29,6 +30,7 @@ class Progress {
   Progress(const std::filesystem::path& log, bool append, bool quiet);
 
   void say(const std::string& line);   // to the log and, unless quiet, to the terminal
+  void warn(const std::string& line);  // to the log, and to the terminal even if quiet
   void log(const std::string& lines);  // to the log only
 
   void begin(const std::string& stage, std::int64_t step, std::int64_t steps, std::int64_t later_steps);

@@ -12,6 +12,7 @@
 #include "error.hpp"
 #include "memory.hpp"
 #include "output/files.hpp"
+#include "output/sealed.hpp"
 #include "run/guard.hpp"
 #include "run/precheck.hpp"
 #include "run/progress.hpp"
@@ -22,6 +23,7 @@
 namespace moraine::run {
 
 namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
 
 namespace {
 
@@ -30,13 +32,21 @@ static_assert(std::atomic<bool>::is_always_lock_free);  // so a signal handler m
 
 struct Files {
   fs::path output;
-  bool left_by_a_run() const { return fs::exists(checkpoint()) || fs::exists(series()); }
+  bool left_by_a_run() const { return holds(checkpoint()) || holds(checkpoint_before()) || holds(series()); }
   fs::path checkpoint() const { return output / "checkpoint.h5"; }
+  fs::path checkpoint_before() const { return output / "checkpoint.previous.h5"; }
   fs::path series() const { return output / "series.h5"; }
   fs::path snapshots() const { return output / "snapshots"; }
   fs::path log() const { return output / "log.txt"; }
   fs::path resolved() const { return output / "case.toml"; }
-  std::vector<fs::path> all() const { return {checkpoint(), series(), snapshots(), log(), resolved()}; }
+  std::vector<fs::path> all() const {
+    return {checkpoint(), checkpoint_before(), series(), snapshots(), log(), resolved()};
+  }
+  // Anything, also what cannot be opened.
+  static bool holds(const fs::path& path) {
+    std::error_code failed;
+    return fs::symlink_status(path, failed).type() != fs::file_type::not_found;
+  }
 };
 
 void make_directories(const fs::path& path) {
@@ -71,10 +81,15 @@ class Runner {
     if (resuming && now_.finished) return {now_.rows, true};
     make_directories(files_.snapshots());
     progress_ = std::make_unique<Progress>(files_.log(), resuming, options_.quiet);
+    if (!damage_.empty()) progress_->warn("warning: " + damage_);
     try {
       run_stages(resuming);
     } catch (const std::exception& e) {
-      const bool kept = fs::exists(files_.checkpoint());
+      try {
+        list_snapshots();
+      } catch (const Error&) {  // of a full disk, say: the first error counts
+      }
+      const bool kept = Files::holds(files_.checkpoint());
       const std::string after =
           kept ? "; the last good checkpoint stays in " + files_.checkpoint().string() : "";
       progress_->say("stopped: " + moraine::in_words(e) + after);
@@ -96,18 +111,40 @@ class Runner {
       return false;
     }
     expect_no_results(options_);
-    if (!fs::exists(files_.checkpoint())) return false;  // cut off before its first checkpoint
-    now_ = output::read_checkpoint(files_.checkpoint());
-    take_changes();
+    const fs::path newest = files_.checkpoint(), before = files_.checkpoint_before();
+    if (!Files::holds(newest) && !Files::holds(before)) return false;  // cut off before its first checkpoint
+    try {
+      accept(newest);
+    } catch (const output::Damaged& e) {
+      damage_ = e.what();
+      if (!Files::holds(before))
+        throw error(damage_, "; there is no checkpoint before it: use --force to run anew");
+      try {
+        accept(before);
+      } catch (const output::Damaged& also) {
+        throw error(damage_, "; ", also.what(), "; use --force to run anew");
+      }
+      damage_ += "; going on from the checkpoint before it, " + before.string();
+      std::error_code failed;
+      fs::rename(before, newest, failed);  // or the next one would push the good one out
+      if (failed)
+        throw error(newest.string(), ": cannot be replaced by ", before.string(), ": ", failed.message());
+    }
     return true;
   }
 
-  // What is no physics may be another since the checkpoint was written.
-  void take_changes() {
+  void accept(const fs::path& checkpoint) {
+    now_ = output::read_checkpoint(checkpoint);
     const std::string refused = changed_physics(now_.case_text, case_);
     if (!refused.empty())
-      throw error(files_.checkpoint().string(), ": belongs to another version of this case: ", refused,
+      throw error(checkpoint.string(), ": belongs to another version of this case: ", refused,
                   "; undo the change, or use --force to run anew");
+    const auto stages = static_cast<std::int64_t>(case_.stages.size());
+    if (now_.stage < 0 || now_.stage >= stages || now_.rows.empty())
+      throw error(checkpoint.string(), ": stands in stage ", now_.stage, " of ", stages,
+                  " (counted from 0) with ", now_.rows.size(),
+                  " rows; expected one of the stages and a row; use --force to run anew");
+    // What is no physics may be another since the checkpoint was written.
     for (const cases::Change& c : cases::changes(now_.case_text, case_)) changes_.push_back(in_words(c));
     now_.scene.neighbour_margin = case_.neighbour_margin;
     now_.water_settings.solver = coupling::Solver(int(case_.fluid.solver));
@@ -139,6 +176,7 @@ class Runner {
 
     for (auto k = static_cast<std::size_t>(now_.stage); k < case_.stages.size(); ++k)
       run_stage(k, resuming), resuming = false;
+    list_snapshots();
     now_.finished = true;
     save();
     series_.reset();
@@ -185,10 +223,9 @@ class Runner {
       const std::int64_t estimate = now_.critical_at + steps_between_estimates;
       if (case_.automatic_dt) until = std::min(until, estimate);
       until = at_exchange(stage, until);
-      const auto began = std::chrono::steady_clock::now();
+      const auto began = Clock::now();
       engine_->advance(until - step);
-      const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
-      if (took < 0.1 && until == step + slice) slice *= 2;
+      if (seconds_since(began) < 0.1 && until == step + slice) slice *= 2;
       step = until;
       const bool due = step == event.step;
       ended = due && event.end;
@@ -200,13 +237,14 @@ class Runner {
         if (event.series) record(stage);
         if (event.snapshot) snapshot(stage);
       }
+      if (Clock::now() >= next_list_) list_snapshots();
       if (case_.automatic_dt && !ended && (due || step == estimate)) follow_bed(stage);
       const std::int64_t done = step - stage.first_step;
       if (options_.on_progress) options_.on_progress(index, done, std::max<std::int64_t>(done, steps));
       progress_->show({done, stage.time(step), now_.rows.back().unbalanced_force});
       if (ended && water_) progress_->say("water, " + water_->solver());
       const bool stop = stop_requested;
-      if (stop || ended || seconds_since_save() > case_.output.checkpoint_interval) {
+      if (stop || ended || seconds_since(saved_) > case_.output.checkpoint_interval) {
         if (!due) take_state();
         if (due || guard.finds_healthy(now_.state)) save();
       }
@@ -261,7 +299,17 @@ class Runner {
     now_.snapshots.push_back(output::write_snapshot(files_.snapshots(), name, now_.rows.back().time,
                                                     stage.scene, now_.state,
                                                     water_ ? std::optional(water_->fields()) : std::nullopt));
+    all_listed_ = false;
+  }
+
+  // For ParaView. The lists are written whole, so that no reader meets half of one; the more snapshots, the
+  // longer that takes. So it waits until it has taken but a fiftieth of the time.
+  void list_snapshots() {
+    if (all_listed_) return;
+    const auto began = Clock::now();
     output::write_xdmf(files_.snapshots(), now_.snapshots);
+    all_listed_ = true;
+    next_list_ = Clock::now() + 50 * (Clock::now() - began);
   }
 
   void take_state() {
@@ -270,11 +318,8 @@ class Runner {
   }
 
   void save() {
-    output::write_checkpoint(files_.checkpoint(), now_);
-    saved_ = std::chrono::steady_clock::now();
-  }
-  double seconds_since_save() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - saved_).count();
+    output::write_checkpoint(files_.checkpoint(), now_, files_.checkpoint_before());
+    saved_ = Clock::now();
   }
 
   Options options_;
@@ -286,8 +331,10 @@ class Runner {
   std::unique_ptr<dem::Engine> engine_;
   std::unique_ptr<Progress> progress_;
   std::vector<std::string> warnings_, changes_;
+  std::string damage_;  // of the checkpoint that was to be resumed from
   std::unique_ptr<output::Series> series_;
-  std::chrono::steady_clock::time_point saved_ = std::chrono::steady_clock::now();
+  Clock::time_point saved_ = Clock::now(), next_list_ = saved_;
+  bool all_listed_ = true;
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "dem/order.hpp"
 #include "dem/packing.hpp"
 #include "error.hpp"
+#include "output/sealed.hpp"
 #include "run/needs.hpp"
 #include "run/schedule.hpp"
 
@@ -58,6 +59,17 @@ dem::Scene scene_of(const cases::Case& c, const cases::Stage& stage, const Start
   return scene;
 }
 
+output::Checkpoint read_start(const std::filesystem::path& path) {
+  try {
+    return output::read_checkpoint(path);
+  } catch (const output::Damaged& e) {
+    throw error(
+        e.what(),
+        "; expected an undamaged copy, or run the case it comes from again: --resume does that from its "
+        "checkpoint before");
+  }
+}
+
 }  // namespace
 
 bool shears(Kind k) { return k == Kind::shear || k == Kind::shear_stress; }
@@ -75,9 +87,10 @@ static double step_of(const cases::Case& c, const cases::Stage& stage, const dem
 
 Start start_of(const cases::Case& c) {
   if (!c.start.empty()) {
-    Start s{output::read_checkpoint(c.start), c.box_x, c.box_y, c.box_z, 0};
+    Start s{read_start(c.start), c.box_x, c.box_y, c.box_z, 0};
     if (!s.before.finished)
       throw error(c.start.string(), ": the case it belongs to has not finished; run it to its end first");
+    if (s.before.state.r.empty()) throw error(c.start.string(), ": has no grains");
     s.before.rows.clear(), s.before.snapshots.clear();
     s.before.stage = 0, s.before.start.time = 0, s.before.finished = false;
     const dem::Scene& scene = s.before.scene;

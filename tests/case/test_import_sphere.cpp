@@ -1,6 +1,7 @@
 #include "case/import_sphere.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cmath>
@@ -130,6 +131,11 @@ TEST_F(ImportSphere, damaged_files_are_refused) {
   EXPECT_TRUE(fault_of(std::string(3000, 'x')).starts_with(": no sphere binary, or damaged: version "));
   EXPECT_EQ(fault(files.path() / "none.bin", files.path() / "x"),
             (files.path() / "none.bin").string() + ": cannot be read; expected a sphere binary");
+  const fs::path loop = files.path() / "loop.bin", pipe = files.path() / "pipe.bin";
+  fs::create_symlink(loop, loop);
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0666), 0);
+  for (const fs::path& none : {loop, pipe, files.path()})
+    EXPECT_EQ(fault(none, files.path() / "x"), none.string() + ": cannot be read; expected a sphere binary");
 }
 
 TEST_F(ImportSphere, a_case_is_not_overwritten) {

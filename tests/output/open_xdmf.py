@@ -20,9 +20,15 @@ def grids_of(step):
     return step.findall("Grid") if step.get("GridType") == "Collection" else [step]
 
 
+def check_times(path):
+    times = [float(step.find("Time").get("Value")) for step in ElementTree.parse(path).find("Domain/Grid").findall("Grid")]
+    assert all(a < b for a, b in zip(times, times[1:])), f"{path}: times do not rise: {times}"
+
+
 def check_xml(path, kinds):
     """The heights of the water's grid, by time."""
     heights = {}
+    check_times(path)
     collection = ElementTree.parse(path).find("Domain/Grid")
     assert collection.get("CollectionType") == "Temporal"
     for step in collection.findall("Grid"):
@@ -93,6 +99,7 @@ def check_water(path, data, time):
 
 def check(path):
     steps = {}
+    check_times(path)
     for step in ElementTree.parse(path).find("Domain/Grid").findall("Grid"):
         steps[float(step.find("Time").get("Value"))] = grids_of(step)
 

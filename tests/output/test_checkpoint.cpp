@@ -1,11 +1,13 @@
 #include <gtest/gtest.h>
 #include <hdf5.h>
 #include <signal.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <limits>
 
+#include "output/sealed.hpp"
 #include "samples.hpp"
 #include "temporary_directory.hpp"
 
@@ -50,7 +52,13 @@ class CheckpointFile : public testing::Test {
   std::string why_not() const {
     return message([&] { read_checkpoint(path); });
   }
-  // Overwrites a number of the file in place, wherever it stands in the groups.
+  // As if the file had been written with what now stands in it.
+  void reseal(std::int64_t format = 5) const {
+    std::string bytes = contents(path);
+    seal(bytes, "checkpoint", format);
+    directory.write("checkpoint.h5", bytes);
+  }
+  // Overwrites a number of the file, wherever it stands in the groups.
   template <class T>
   void change(const std::string& dataset, hid_t type, std::vector<T> values) const {
     const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
@@ -58,6 +66,7 @@ class CheckpointFile : public testing::Test {
     ASSERT_GE(H5Dwrite(id, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0);
     H5Dclose(id);
     H5Fclose(file);
+    reseal();
   }
 
   TemporaryDirectory directory;
@@ -104,13 +113,37 @@ TEST_F(CheckpointFile, KeepsEmptyTexts) {
 TEST_F(CheckpointFile, RefusesWhatIsNoCheckpoint) {
   EXPECT_EQ(why_not(), path.string() + ": cannot open the file: No such file or directory");
 
-  directory.write("checkpoint.h5", "");
-  EXPECT_EQ(why_not(), path.string() + ": not an HDF5 file");
-  directory.write("checkpoint.h5", std::string(100'000, 'x'));
-  EXPECT_EQ(why_not(), path.string() + ": not an HDF5 file");
-
+  const std::string other = path.string() + ": not a checkpoint of moraine, or damaged";
+  for (const std::string& text : {std::string(), std::string(100'000, 'x'), std::string(100'000, '\0')}) {
+    directory.write("checkpoint.h5", text);
+    EXPECT_EQ(why_not(), other);
+  }
   { Series series(path, {}); }
-  EXPECT_EQ(why_not(), path.string() + ": not a checkpoint of moraine");
+  EXPECT_EQ(why_not(), other);
+  const dem::State grain{.id = {0},
+                         .r = {1},
+                         .x = {{}},
+                         .v = {{}},
+                         .omega = {{}},
+                         .rotation = {{}},
+                         .force = {{}},
+                         .torque = {{}},
+                         .x_start = {{}},
+                         .role = {dem::Role::free}};
+  write_snapshot(directory.path(), "checkpoint", 0, {}, grain);
+  EXPECT_EQ(why_not(), other);
+}
+
+// None of these may be waited for, or taken for an old state that another could replace.
+TEST_F(CheckpointFile, RefusesWhatIsNoFile) {
+  std::filesystem::create_directory(path);
+  EXPECT_EQ(why_not(), path.string() + ": not a file but a directory");
+  std::filesystem::remove(path);
+  ASSERT_EQ(mkfifo(path.c_str(), 0666), 0);
+  EXPECT_EQ(why_not(), path.string() + ": not a file");
+  std::filesystem::remove(path);
+  std::filesystem::create_symlink(path, path);
+  EXPECT_EQ(why_not(), path.string() + ": cannot open the file: Too many levels of symbolic links");
 }
 
 TEST_F(CheckpointFile, RefusesOneThatWasCutShort) {
@@ -123,15 +156,96 @@ TEST_F(CheckpointFile, RefusesOneThatWasCutShort) {
   EXPECT_TRUE(contains(why_not(), "truncated")) << why_not();
 }
 
-TEST_F(CheckpointFile, RefusesALaterFormat) {
+// A hole of a terabyte is not read.
+TEST_F(CheckpointFile, RefusesAHugeFileAtOnce) {
   write_checkpoint(path, sample(2));
-  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
-  const hid_t format = H5Aopen(file, "format", H5P_DEFAULT);
-  const std::int64_t later = 1000;
-  ASSERT_GE(H5Awrite(format, H5T_NATIVE_INT64, &later), 0);
-  H5Aclose(format);
-  H5Fclose(file);
-  EXPECT_TRUE(contains(why_not(), path.string() + ": written by a later version")) << why_not();
+  ASSERT_EQ(truncate(path.c_str(), std::int64_t{1} << 40), 0);
+  EXPECT_TRUE(contains(why_not(), "damaged: 1099511627776 bytes where it had ")) << why_not();
+}
+
+TEST_F(CheckpointFile, FindsEveryDamage) {
+  write_checkpoint(path, sample(60));
+  const std::string whole = contents(path);
+  std::mt19937 random(2013);
+  const auto below = [&](std::size_t n) { return random() % n; };
+  for (int k = 0; k < 700; ++k) {
+    std::string bytes = whole;
+    const std::size_t at = below(whole.size()), length = 1 + below(5000), other = below(whole.size());
+    switch (k % 7) {
+      case 0:
+        bytes[at] = static_cast<char>(bytes[at] ^ (1 << below(8)));
+        break;
+      case 1:
+        bytes.resize(at);
+        break;
+      case 2:
+        bytes.replace(at, length, length, '\0');
+        break;
+      case 3:
+        bytes.replace(at, 0, whole.substr(other, length));
+        break;
+      case 4:
+        bytes.append(whole, other, length);
+        break;
+      case 5:
+        bytes.erase(at, length);
+        break;
+      case 6:
+        for (std::size_t i = 0; i < 512 && at + i < bytes.size() && other + i < bytes.size(); ++i)
+          std::swap(bytes[at + i], bytes[other + i]);
+    }
+    if (bytes == whole) continue;  // zeros where zeros were
+    directory.write("checkpoint.h5", bytes);
+    EXPECT_THROW(read_checkpoint(path), Damaged) << "damage " << k << " at " << at;
+  }
+  // Each byte of the seal itself.
+  for (std::size_t at = 0; at < seal_size; ++at) {
+    std::string bytes = whole;
+    bytes[at] = static_cast<char>(bytes[at] ^ 4);
+    directory.write("checkpoint.h5", bytes);
+    EXPECT_THROW(read_checkpoint(path), Damaged) << "byte " << at;
+  }
+}
+
+TEST_F(CheckpointFile, RefusesAnotherFormat) {
+  write_checkpoint(path, sample(2));
+  std::string hdf5 = contents(path).substr(seal_size);
+  reseal(1000);
+  EXPECT_EQ(
+      why_not(),
+      path.string() + ": written by a later version of moraine (checkpoint format 1000; this one reads 5)");
+
+  directory.write("checkpoint.h5", hdf5);  // has lost its seal
+  EXPECT_THROW(read_checkpoint(path), Damaged);
+  hdf5[25] = 0;  // as formats before 5 were
+  directory.write("checkpoint.h5", hdf5);
+  EXPECT_TRUE(
+      contains(why_not(), path.string() + ": written by an earlier version of moraine (checkpoint format 4"))
+      << why_not();
+  EXPECT_TRUE(contains(why_not(), "this one reads 5")) << why_not();
+}
+
+// A checkpoint before it is no help where this version is the wrong one.
+TEST_F(CheckpointFile, CallsOnlyDamageDamage) {
+  write_checkpoint(path, sample(2));
+  reseal(6);
+  try {
+    read_checkpoint(path);
+    FAIL();
+  } catch (const Damaged&) {
+    FAIL();
+  } catch (const Error&) {
+  }
+}
+
+TEST_F(CheckpointFile, KeepsTheOneBefore) {
+  const auto before = directory.path() / "before.h5";
+  write_checkpoint(path, sample(1), before);
+  EXPECT_FALSE(exists(before));
+  write_checkpoint(path, sample(2), before);
+  write_checkpoint(path, sample(3), before);
+  EXPECT_EQ(read_checkpoint(path).state.size(), 3);
+  EXPECT_EQ(read_checkpoint(before).state.size(), 2);
 }
 
 TEST_F(CheckpointFile, RefusesWhatIsNoState) {
@@ -160,6 +274,7 @@ TEST_F(CheckpointFile, RefusesWhatIsNoState) {
   const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
   H5Ldelete(file, "state/torque", H5P_DEFAULT);
   H5Fclose(file);
+  reseal();
   EXPECT_TRUE(refused("/torque: cannot open the dataset")) << why_not();
 }
 

@@ -4,6 +4,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
+
 #include "output/hdf5.hpp"
 #include "samples.hpp"
 #include "temporary_directory.hpp"
@@ -138,6 +140,21 @@ TEST_F(SeriesFile, RefusesWhatIsNoSeries) {
   EXPECT_EQ(why_not(), path.string() + ": not an HDF5 file");
   write_checkpoint(path, {});
   EXPECT_TRUE(contains(why_not(), path.string() + ": /stage: cannot open the dataset")) << why_not();
+}
+
+// HDF5 would read again and again what does not fit its checksum.
+TEST_F(SeriesFile, RefusesGarbageInSeconds) {
+  { Series series(path, some_rows(1000)); }
+  const std::string whole = contents(path);
+  std::mt19937 random(2013);
+  for (const std::size_t from : {12, 48, 100, 600, 5000}) {
+    std::string bytes = whole;
+    for (std::size_t k = from; k < bytes.size(); ++k) bytes[k] = static_cast<char>(random());
+    directory.write("series.h5", bytes);
+    const auto began = std::chrono::steady_clock::now();
+    EXPECT_NE(message([&] { read_series(path); }), "") << "garbage from byte " << from;
+    EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(5));
+  }
 }
 
 }  // namespace

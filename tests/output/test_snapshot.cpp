@@ -3,6 +3,7 @@
 #include <sys/wait.h>
 
 #include "output/hdf5.hpp"
+#include "output/sealed.hpp"
 #include "samples.hpp"
 #include "temporary_directory.hpp"
 
@@ -167,7 +168,7 @@ TEST_F(Snapshot, WaterOpensAsAGrid) {
     snapshots.push_back(write_snapshot(directory.path(), "wet-" + std::to_string(snapshots.size()), height,
                                        bed.scene, bed.state, water_of(height)));
   write_xdmf(directory.path(), snapshots);
-  const auto script = std::filesystem::path(__FILE__).parent_path() / "open_xdmf.py";
+  const auto script = std::filesystem::path(MORAINE_SOURCE_DIR) / "tests/output/open_xdmf.py";
   for (const char* how : {"--xml", "--vtk"}) {
     const std::string command = "python3 " + script.string() + " " + how + " " + directory.path().string();
     const int status = WEXITSTATUS(std::system(command.c_str()));
@@ -175,9 +176,52 @@ TEST_F(Snapshot, WaterOpensAsAGrid) {
   }
 }
 
+std::vector<double> times_in(const std::filesystem::path& xdmf) {
+  std::vector<double> times;
+  std::string text = contents(xdmf);
+  const std::string key = "<Time Value=\"";
+  for (auto at = text.find(key); at != text.npos; at = text.find(key, at + 1))
+    times.push_back(std::stod(text.substr(at + key.size())));
+  return times;
+}
+
+// Where a stage ends and the next begins there are two snapshots of one time, both kept.
+TEST_F(Snapshot, AreListedOnceForEachTime) {
+  std::vector<SnapshotInfo> snapshots;
+  for (const auto& [name, time, wet] : {std::tuple{"01-a-0", 0.0, 0},
+                                        {"01-a-1", 0.3, 1},
+                                        {"02-b-0", 0.3, 1},
+                                        {"02-b-1", 0.6, 1},
+                                        {"03-c-0", 0.6, 0},
+                                        {"03-c-1", 0.7, 0}})
+    snapshots.push_back({std::string(name) + ".h5", time, 1, 0, wet, wet, wet, {1, 1, 1}});
+  write_xdmf(directory.path(), snapshots);
+  for (const char* file : {"grains.xdmf", "contacts.xdmf"})
+    EXPECT_EQ(times_in(directory.path() / file), (std::vector{0.0, 0.3, 0.6, 0.7})) << file;
+  const std::string text = contents(directory.path() / "grains.xdmf");
+  for (const char* listed : {"01-a-0", "02-b-0", "03-c-0", "03-c-1"})
+    EXPECT_TRUE(contains(text, listed)) << listed;
+  // The last step with water is listed, though a dry one of its time follows.
+  for (const char* file : {"water.xdmf", "bed.xdmf"}) {
+    EXPECT_TRUE(contains(contents(directory.path() / file), "02-b-1")) << file;
+    EXPECT_FALSE(contains(contents(directory.path() / file), "01-a-1")) << file;
+  }
+  EXPECT_EQ(times_in(directory.path() / "water.xdmf"), (std::vector{0.3, 0.6}));
+}
+
+TEST_F(Snapshot, CarriesItsDigest) {
+  const Bed bed;
+  const auto file = path(write_snapshot(directory.path(), "a", 0, bed.scene, bed.state));
+  EXPECT_EQ(read_sealed(file).kind, "snapshot");
+  std::string bytes = contents(file);
+  bytes[bytes.size() / 2] ^= 1;
+  directory.write("a.h5", bytes);
+  EXPECT_THROW(read_sealed(file), Damaged);
+}
+
 // Also with a step, or all steps, without contacts.
 TEST_F(Snapshot, OpensInVtk) {
-  const auto script = std::filesystem::path(__FILE__).parent_path() / "open_xdmf.py";
+  const auto script = std::filesystem::path(MORAINE_SOURCE_DIR) / "tests/output/open_xdmf.py";
   const Bed bed;
   Bed loose = bed;
   loose.state.contacts.clear();

@@ -190,7 +190,7 @@ TEST_F(Errors, StartFiles) {
   make("not-run", small_case());
   expect_error(words("../not-run"), {"start=../not-run", "run that case first"});
   directory.write("text.h5", "no HDF5 file");
-  expect_error(words("../text.h5"), {"text.h5", "not an HDF5 file"});
+  expect_error(words("../text.h5"), {"text.h5", "not a checkpoint of moraine"});
 
   const fs::path bed = make("bed", "stages = [\"settle\"]\n" + small_case());
   run(bed, {"stage.settle.duration=0.01"});

@@ -121,9 +121,67 @@ TEST_F(Restart, InterruptedInOrder) {
       const std::string message = contents(directory.path() / "err");
       EXPECT_NE(message.find("interrupted at step"), std::string::npos) << message;
       EXPECT_NE(message.find("--resume"), std::string::npos) << message;
+      // Lists for ParaView wait for their turn while the run goes on, but not now.
+      const std::string last = snapshots_of(cut).back().filename().string();
+      EXPECT_NE(contents(cut / "output/snapshots/grains.xdmf").find(last), std::string::npos) << last;
     }
     finish_and_compare();
   }
+}
+
+// A disk that gives back other bytes than it was given costs the time since the checkpoint before.
+TEST_F(Restart, FromTheCheckpointBeforeADamagedOne) {
+  const fs::path newest = checkpoint_of(cut), before = cut / "output/checkpoint.previous.h5";
+  const auto resume = [&] {
+    auto words = to_run(cut);
+    words.push_back("--resume");
+    return moraine(words);
+  };
+  const auto flip = [](const fs::path& file) {
+    std::string bytes = contents(file);
+    bytes[bytes.size() / 2] ^= 16;
+    std::ofstream(file, std::ios::binary) << bytes;
+  };
+  for (const bool finished : {false, true}) {
+    fs::remove_all(cut / "output");
+    run_for((finished ? 100 : 0.5) * length, SIGTERM);
+    ASSERT_TRUE(fs::exists(before));
+    for (const bool gone : {false, true}) {
+      if (gone)
+        fs::remove(newest);
+      else
+        flip(newest);
+      const Outcome o = resume();
+      EXPECT_EQ(o.status, 0) << o.err;
+      for (const std::string& text : {o.err, contents(cut / "output/log.txt")}) {
+        EXPECT_NE(text.find("going on from the checkpoint before it"), std::string::npos) << text;
+        EXPECT_NE(text.find(newest.string() + (gone ? ": cannot open" : ": damaged")), std::string::npos)
+            << text;
+      }
+      expect_same_results(whole, cut);
+    }
+  }
+  flip(newest), flip(before);
+  auto words = to_run(cut);
+  words.push_back("--resume");
+  expect_error(words, {newest.string() + ": damaged", before.string() + ": damaged", "--force"});
+  fs::remove(before);
+  expect_error(words, {newest.string() + ": damaged", "no checkpoint before it", "--force"});
+  ASSERT_NO_FATAL_FAILURE(run(cut, {}, {"--force"}));
+}
+
+// What has been restored is not pushed out by the next checkpoint.
+TEST_F(Restart, TheGoodCheckpointTakesThePlaceOfTheDamagedOne) {
+  run_for(0.5 * length, SIGTERM);
+  const fs::path newest = checkpoint_of(cut), before = cut / "output/checkpoint.previous.h5";
+  const std::string good = contents(before);
+  ASSERT_FALSE(good.empty());
+  std::ofstream(newest, std::ios::binary) << "rotten";
+  run_for(0s, SIGKILL);
+  bool kept = false;
+  for (const fs::path& file : {newest, before}) kept = kept || contents(file).starts_with("moraine sha256");
+  EXPECT_TRUE(kept);
+  finish_and_compare();
 }
 
 TEST_F(Restart, OnAnotherNumberOfThreads) {
