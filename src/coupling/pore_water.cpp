@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "coupling/mapping.hpp"
+#include "coupling/wall_gap.hpp"
 #include "dem/engine_parts.hpp"
 #include "dem/spectrum.hpp"
 #include "dem/touching.hpp"
@@ -21,6 +22,7 @@ constexpr double map_lasts = 0.01;  // of a cell, that grains may move before th
 constexpr double most_of_limit =
     0.9;  // of the step at which grains and water would swing up: contacts come and go
 constexpr int power_iterations = 60;
+constexpr double tolerable = 0.02;  // of error_of_few_cells(), to say nothing
 
 // Means over what each cell of a grid of `to` cells covers of one of `from`, in parts of their lengths.
 std::vector<double> on_another_grid(std::vector<double> p, const std::vector<std::int32_t>& from,
@@ -240,6 +242,13 @@ class GridWater final : public PoreWater {
     else
       out << interval_ << " steps";
     out << " (at most " << stability_.longest << ")";
+    if (const double error = error_of_few_cells(water_); error > tolerable) {
+      Water enough = water_;
+      while (error_of_few_cells(enough) > tolerable) ++enough.cells[2];
+      out << "; so few over the height even out the pressure " << 100 * error
+          << " % too fast (fluid.cells_z = " << enough.cells[2] << ": " << 100 * error_of_few_cells(enough)
+          << " %)";
+    }
     return out.str();
   }
 
@@ -316,8 +325,12 @@ class GridWater final : public PoreWater {
     for (std::size_t c = 0; c < grid_.cells(); ++c) {
       double& phi = medium_.porosity[c];
       phi = std::clamp(phi, water_.porosity_range[0], water_.porosity_range[1]);
-      medium_.permeability[c] = water_.k_c * phi * phi * phi / ((1 - phi) * (1 - phi));
+      medium_.permeability[c] = kozeny_carman(water_.k_c, phi);
     }
+    if (scene_.floor)
+      medium_.across[2][0] = across_wall(grid_, grains_.data(), x, water_.porosity_range, false);
+    if (has_wall(scene_))
+      medium_.across[2][1] = across_wall(grid_, grains_.data(), x, water_.porosity_range, true);
     step_.set(grid_, medium_);
   }
 
@@ -408,7 +421,8 @@ class GridWater final : public PoreWater {
           double beyond = p[c];
           if (s.kind == fluid::Side::Kind::pressure) beyond = s.at(t);
           if (s.kind == fluid::Side::Kind::flux)
-            beyond = p[c] + s.at(t) * water_.viscosity * stride / medium_.permeability[c];
+            beyond = p[c] + s.at(t) * water_.viscosity * stride /
+                                (medium_.across[a][high] * medium_.permeability[c]);
           g_[a][f] += high ? -beyond : beyond;
         };
         const auto last = [&](int axis) { return axis == a ? 1 : grid_.n[axis]; };
@@ -547,6 +561,14 @@ class GridWater final : public PoreWater {
 };
 
 }  // namespace
+
+double error_of_few_cells(const Water& w) {
+  const auto drained = [](const fluid::Side& s) { return s.kind == fluid::Side::Kind::pressure; };
+  const bool top = w.top == TopSide::drained && drained(w.sides.high[2]), bottom = drained(w.sides.low[2]);
+  if (!top && !bottom) return 0;
+  const double n = top && bottom ? 0.5 * w.cells[2] : w.cells[2], angle = std::numbers::pi / (2 * n);
+  return angle * angle / 6;
+}
 
 bool water_built() { return true; }
 

@@ -45,6 +45,12 @@ class PoreWater : public dem::Surroundings {
       const = 0;  // e.g. "water: 8 x 8 x 7 cells of 0.105 m (2.6 d), exchange every step, pcg"
 };
 
+// By what part pressures that drain through floor or top even out too fast on a grid of so few cells, 0 where
+// they do not drain there: (pi/2n)^2/6 over n cells from the closed end, or the middle, to a drained one.
+// Hats spread the pressure of a cell over its neighbours, the grains store less for it (- (pi/2n)^2/4), and
+// the flow between centres makes up for a third.
+double error_of_few_cells(const Water& water);
+
 // Whether this build has pore water in it (MORAINE_FLUID).
 bool water_built();
 

@@ -1,5 +1,6 @@
 #include "fluid/darcy.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "error.hpp"
@@ -72,13 +73,27 @@ void Darcy::set(const Grid& grid, const Medium& m) {
       refuse("permeability", m.permeability[c], "m2, 0 or more and finite");
   }
 
+  for (const auto& axis : m.across)
+    for (const double v : axis)
+      if (!(v > 0) || !std::isfinite(v))
+        throw error("pore water: permeability across a side ", v,
+                    " times that of its cells; expected a positive number");
+
   grid_ = grid;
   ++version_;
   const double volume = grid.cell_volume();
   for (std::size_t c = 0; c < cells; ++c) storage_[c] = m.compressibility * m.porosity[c] * volume;
   for (int a = 0; a < 3; ++a) {
     const double factor = grid.face_area(a) / (m.viscosity * grid.h(a));
-    const auto& k = m.permeability;
+    std::vector<double> k = m.permeability;
+    if (!grid.periodic[a]) {
+      // The same cells where there is one alone: the less permeable way through counts.
+      const auto& across = m.across[a];
+      const bool one = grid.n[a] == 1;
+      const double both = std::min(across[0], across[1]);
+      each_side_cell(a, false, [&](std::size_t c, std::size_t) { k[c] *= one ? both : across[0]; });
+      if (!one) each_side_cell(a, true, [&](std::size_t c, std::size_t) { k[c] *= across[1]; });
+    }
     each_face(a, [&](int, std::size_t f, std::size_t low, std::size_t high) {
       double& T = transmissibility_[a][f];
       if (low == no_cell || high == no_cell) {

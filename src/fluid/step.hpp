@@ -24,6 +24,8 @@ struct Medium {
   double compressibility = 4.5e-10;  // 1/Pa, beta
   std::vector<double> porosity;      // 1, phi of each cell
   std::vector<double> permeability;  // m2, k of each cell
+  // Of the cells at the low and high side of an axis: k for flow across that side over their k.
+  std::array<std::array<double, 2>, 3> across{{{1, 1}, {1, 1}, {1, 1}}};
 };
 
 enum class SolverChoice { automatic, pcg, cholmod };

@@ -28,9 +28,9 @@ std::vector<output::Row> rows_of_stage(std::size_t stage, const std::vector<outp
 
 }  // namespace
 
-output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, double time_0,
-                   double energy_0) {
-  const dem::Observation o = dem::observe(stage.scene, s);
+output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, const dem::Loads& loads,
+                   double time_0, double energy_0) {
+  const dem::Observation o = dem::observe(stage.scene, s, loads);
   const dem::Energy& e = o.energy;
   const dem::Ledger& l = s.ledger;
   output::Row row{};

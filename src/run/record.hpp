@@ -13,8 +13,9 @@ namespace moraine::run {
 // What pore water adds to a row.
 void add_water(output::Row& row, const Stage& stage, const coupling::PoreWater& water);
 
-output::Row row_of(std::size_t index, const Stage& stage, const dem::State& state, double time_0,
-                   double energy_0);
+// loads: dem/observe.hpp.
+output::Row row_of(std::size_t index, const Stage& stage, const dem::State& state, const dem::Loads& loads,
+                   double time_0, double energy_0);
 
 // How the friction curve of a shear stage is read.
 //   peak: the largest value, but not the first, when the wall may still be finding its place

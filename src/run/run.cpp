@@ -143,6 +143,7 @@ class Runner {
         follow_bed(stage);
       }
       now_.energy_0 = dem::observe(stage.scene, now_.state).energy.total();
+      loads_ = dem::loads_of(stage.scene, now_.state);
       record(stage);
       snapshot(stage);
       if (index == 0) save();
@@ -167,11 +168,11 @@ class Runner {
       if (case_.automatic_dt) until = std::min(until, estimate);
       until = at_exchange(stage, until);
       const auto began = std::chrono::steady_clock::now();
-      engine_->advance(until - step);
+      const bool due = until == event.step;
+      due ? advance_to_record(stage, until - step) : engine_->advance(until - step);
       const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
       if (took < 0.1 && until == step + slice) slice *= 2;
       step = until;
-      const bool due = step == event.step;
       ended = due && event.end;
       if (due || step == look) {
         take_state();
@@ -207,9 +208,26 @@ class Runner {
     now_.scene = stage.scene;
   }
 
+  // The last interval between exchanges step by step, for the mean loads over it. Same bits as in one go.
+  void advance_to_record(const Stage& stage, std::int64_t steps) {
+    const std::int64_t m = std::max<std::int64_t>(1, stage.scene.exchange_interval);
+    std::vector<dem::Loads> last;
+    if (m > 1) {
+      engine_->advance(steps - m);
+      steps = 1;
+      for (std::int64_t k = 1; k < m; ++k) {
+        engine_->advance(1);
+        last.push_back(dem::loads_of(stage.scene, engine_->state()));
+      }
+    }
+    engine_->advance(steps);
+    last.push_back(dem::loads_of(stage.scene, engine_->state()));
+    loads_ = dem::mean(last);
+  }
+
   void record(const Stage& stage) {
-    now_.rows.push_back(row_of(static_cast<std::size_t>(now_.stage), stage, now_.state, now_.stage_start_time,
-                               now_.energy_0));
+    now_.rows.push_back(row_of(static_cast<std::size_t>(now_.stage), stage, now_.state, loads_,
+                               now_.stage_start_time, now_.energy_0));
     if (water_) add_water(now_.rows.back(), stage, *water_);
     if (!water_ && case_.has_water()) now_.rows.back().total_friction = now_.rows.back().shear_friction;
     series_->append(now_.rows.back());
@@ -220,9 +238,9 @@ class Runner {
     std::snprintf(name, sizeof name, "%02d-%s-%06lld", static_cast<int>(now_.stage) + 1, stage.name.c_str(),
                   static_cast<long long>(std::ceil(
                       (stage.scene.time(now_.state.step) - 0.5 * stage.scene.dt) / stage.snapshot_interval)));
-    now_.snapshots.push_back(output::write_snapshot(files_.snapshots(), name, now_.rows.back().time,
-                                                    stage.scene, now_.state,
-                                                    water_ ? std::optional(water_->fields()) : std::nullopt));
+    now_.snapshots.push_back(
+        output::write_snapshot(files_.snapshots(), name, now_.rows.back().time, stage.scene, now_.state,
+                               water_ ? std::optional(water_->fields()) : std::nullopt, &loads_));
     output::write_xdmf(files_.snapshots(), now_.snapshots);
   }
 
@@ -244,6 +262,7 @@ class Runner {
   Files files_;
   Start start_;
   output::Checkpoint now_;
+  dem::Loads loads_;  // of the step, or with pore water over the interval, that led to the present record
   std::unique_ptr<coupling::PoreWater> water_;  // of the present stage
   std::unique_ptr<dem::Engine> engine_;
   std::unique_ptr<Progress> progress_;
