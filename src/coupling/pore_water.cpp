@@ -327,10 +327,8 @@ class GridWater final : public PoreWater {
       phi = std::clamp(phi, water_.porosity_range[0], water_.porosity_range[1]);
       medium_.permeability[c] = kozeny_carman(water_.k_c, phi);
     }
-    if (scene_.floor)
-      medium_.across[2][0] = across_wall(grid_, grains_.data(), x, water_.porosity_range, false);
-    if (has_wall(scene_))
-      medium_.across[2][1] = across_wall(grid_, grains_.data(), x, water_.porosity_range, true);
+    if (scene_.floor) medium_.gap[2][0] = wall_gap(grid_, grains_.data(), x, water_.porosity_range, false);
+    if (has_wall(scene_)) medium_.gap[2][1] = wall_gap(grid_, grains_.data(), x, water_.porosity_range, true);
     step_.set(grid_, medium_);
   }
 
@@ -420,9 +418,10 @@ class GridWater final : public PoreWater {
           const fluid::Side& s = side(a, high);
           double beyond = p[c];
           if (s.kind == fluid::Side::Kind::pressure) beyond = s.at(t);
+          const fluid::WallGap& gap = medium_.gap[a][high];
           if (s.kind == fluid::Side::Kind::flux)
-            beyond = p[c] + s.at(t) * water_.viscosity * stride /
-                                (medium_.across[a][high] * medium_.permeability[c]);
+            beyond =
+                p[c] + s.at(t) * water_.viscosity * (stride - gap.width) / (gap.k * medium_.permeability[c]);
           g_[a][f] += high ? -beyond : beyond;
         };
         const auto last = [&](int axis) { return axis == a ? 1 : grid_.n[axis]; };

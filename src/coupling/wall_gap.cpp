@@ -9,8 +9,9 @@ double kozeny_carman(double k_c, double porosity) {
   return k_c * porosity * porosity * porosity / ((1 - porosity) * (1 - porosity));
 }
 
-double across_wall(const fluid::Grid& grid, const dem::GrainRow* grains, const std::vector<dem::Vec3d>& x,
-                   const std::array<double, 2>& porosity_range, bool high) {
+fluid::WallGap wall_gap(const fluid::Grid& grid, const dem::GrainRow* grains,
+                        const std::vector<dem::Vec3d>& x, const std::array<double, 2>& porosity_range,
+                        bool high) {
   const std::size_t n = x.size();
   double radius = 0;
   for (std::size_t i = 0; i < n; ++i) radius += grains[i].r;
@@ -18,7 +19,7 @@ double across_wall(const fluid::Grid& grid, const dem::GrainRow* grains, const s
 
   const double height = grid.length[2], cell = grid.h(2);
   const double depth = std::min(std::max(cell, 5 * radius), 0.5 * height);  // not into the other wall's gap
-  if (depth < 2 * radius) return 1;                                         // no bed behind the gap
+  if (depth < 2 * radius) return {};                                        // no bed behind the gap
 
   // m3, of solids within so much of the wall: in the gap, in the bed to `depth`, in the cells.
   const std::array<double, 3> within{radius, depth, cell};
@@ -35,8 +36,10 @@ double across_wall(const fluid::Grid& grid, const dem::GrainRow* grains, const s
                       porosity_range[1]);
   };
   const double at_wall = porosity(solids[2], cell), behind = porosity(solids[1] - solids[0], depth - radius);
-  const double k_at_wall = kozeny_carman(1, at_wall), k_behind = kozeny_carman(1, behind);
-  return std::min(1.0, k_behind / k_at_wall * ((1 - behind) / (1 - at_wall)));
+  if (behind >= at_wall) return {};
+  // What does not fit beside the centres of cells as small as grains is left out.
+  const double width = cell * (1 - (1 - at_wall) / (1 - behind));
+  return {kozeny_carman(1, behind) / kozeny_carman(1, at_wall), std::min(width, 0.4 * cell)};
 }
 
 }  // namespace moraine::coupling
