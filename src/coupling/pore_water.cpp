@@ -231,20 +231,24 @@ class GridWater final : public PoreWater {
   }
 
   std::string outside() const override {
-    std::ostringstream out;
-    out.precision(3);
+    const Outside& out = mapping_.outside();
+    std::ostringstream text;
+    text.precision(3);
     for (int a = 0; a < 3; ++a)
       for (const bool high : {false, true}) {
-        const int count = mapping_.outside().grains[a][high];
-        if (count == 0) continue;
-        out << (out.tellp() > 0 ? "; " : "") << count << (count == 1 ? " grain" : " grains") << " beyond "
-            << "xyz"[a] << " = " << (high ? grid_.length[a] : 0) << " m ("
-            << mapping_.outside().volume[a][high] << " m3), where "
-            << (side(a, high).kind == fluid::Side::Kind::closed
-                    ? "no water can come in for them: the balance lacks it"
-                    : "water has taken their place");
+        const int count = out.grains[a][high];
+        if (out.volume[a][high] == 0) continue;
+        text << (text.tellp() > 0 ? "; " : "");
+        if (count > 0)
+          text << count << (count == 1 ? " grain" : " grains");
+        else
+          text << "parts of grains";
+        text << " beyond "
+             << "xyz"[a] << " = " << (high ? grid_.length[a] : 0) << " m (" << out.volume[a][high]
+             << " m3 of solids)";
+        if (side(a, high).kind == fluid::Side::Kind::closed) text << ", where no water can take their place";
       }
-    return out.str();
+    return text.str();
   }
 
   std::string describe() const override {
