@@ -41,6 +41,9 @@ class PoreWater : public dem::Surroundings {
   // Pressures over all cells, or over the upper half of their levels, where a sheared bed deforms.
   virtual WaterRecord record(bool upper_half) const = 0;
   virtual std::string solver() const = 0;  // as used so far, e.g. "pcg, jacobi: 6.2 iterations a solve"
+  // What lies outside the grid, by side, e.g. "3 grains beyond x = 0.2 m (1e-05 m3 of solids)"; empty:
+  // nothing.
+  virtual std::string outside() const = 0;
   virtual std::string describe()
       const = 0;  // e.g. "water: 8 x 8 x 7 cells of 0.105 m (2.6 d), exchange every step, pcg"
 };

@@ -9,13 +9,23 @@ double kozeny_carman(double k_c, double porosity) {
   return k_c * porosity * porosity * porosity / ((1 - porosity) * (1 - porosity));
 }
 
+// Beyond an open side of x or y.
+static bool beyond(const fluid::Grid& grid, const dem::Vec3d& x) {
+  for (int a = 0; a < 2; ++a)
+    if (!grid.periodic[a] && (x[a] < 0 || x[a] > grid.length[a])) return true;
+  return false;
+}
+
 fluid::WallGap wall_gap(const fluid::Grid& grid, const dem::GrainRow* grains,
                         const std::vector<dem::Vec3d>& x, const std::array<double, 2>& porosity_range,
                         bool high) {
   const std::size_t n = x.size();
-  double radius = 0;
-  for (std::size_t i = 0; i < n; ++i) radius += grains[i].r;
-  radius /= static_cast<double>(n);
+  double square = 0, cube = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double r = grains[i].r;
+    square += r * r, cube += r * r * r;
+  }
+  const double radius = cube / square;  // of the grains that fill the bed: Sauter's mean
 
   const double height = grid.length[2], cell = grid.h(2);
   const double depth = std::min(std::max(cell, 5 * radius), 0.5 * height);  // not into the other wall's gap
@@ -25,6 +35,7 @@ fluid::WallGap wall_gap(const fluid::Grid& grid, const dem::GrainRow* grains,
   const std::array<double, 3> within{radius, depth, cell};
   std::array<double, 3> solids{};
   for (std::size_t i = 0; i < n; ++i) {
+    if (beyond(grid, x[i])) continue;
     const double r = grains[i].r, z = high ? height - x[i].z : x[i].z;
     for (int k = 0; k < 3; ++k) {
       const double t = std::clamp(within[k] - z, -r, r);  // of the sphere, up to there

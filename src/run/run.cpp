@@ -156,6 +156,7 @@ class Runner {
                   case_.automatic_dt ? ", which follows the bed" : "");
     progress_->say(text);
     if (water_) progress_->say(water_->describe() + "; " + stability_of(*water_, stage.scene.dt));
+    said_outside_.clear();
     progress_->begin(stage.name, step, steps, 0);
 
     Guard guard(case_.guards, stage, now_.rows);
@@ -185,6 +186,7 @@ class Runner {
       if (case_.automatic_dt && !ended && (due || step == estimate)) follow_bed(stage);
       if (options_.on_progress) options_.on_progress(index, step, std::max<std::int64_t>(step, steps));
       progress_->show({step, stage.scene.time(step), now_.rows.back().unbalanced_force});
+      if (water_ && (due || step == look)) say_outside(ended);
       if (ended && water_) progress_->say("water, " + water_->solver());
       const bool stop = stop_requested;
       if (stop || ended || seconds_since_save() > case_.output.checkpoint_interval) {
@@ -223,6 +225,14 @@ class Runner {
     engine_->advance(steps);
     last.push_back(dem::loads_of(stage.scene, engine_->state()));
     loads_ = dem::mean(last);
+  }
+
+  // When the first grains leave, and how many have at the end.
+  void say_outside(bool ended) {
+    const std::string outside = water_->outside();
+    if (outside.empty() || outside == said_outside_ || !(said_outside_.empty() || ended)) return;
+    progress_->say("warning: outside the water: " + outside);
+    said_outside_ = outside;
   }
 
   void record(const Stage& stage) {
@@ -267,6 +277,7 @@ class Runner {
   std::unique_ptr<dem::Engine> engine_;
   std::unique_ptr<Progress> progress_;
   std::vector<std::string> warnings_;
+  std::string said_outside_;  // in this stage
   std::unique_ptr<output::Series> series_;
   std::chrono::steady_clock::time_point saved_ = std::chrono::steady_clock::now();
 };

@@ -76,6 +76,12 @@ double mean_diameter(const dem::State& s) {
   return sum / s.size();
 }
 
+double sauter_diameter(const dem::State& s) {
+  double volume = 0, area = 0;
+  for (const double r : s.r) volume += r * r * r, area += r * r;
+  return 2 * volume / area;
+}
+
 // dt = f sqrt(min m / max k), eq. 9; the walls count among the k.
 double step_by_eq_9(const dem::Scene& scene, const dem::State& s, double f) {
   const double m = dem::sphere_mass(scene.density, *std::min_element(s.r.begin(), s.r.end()));
@@ -121,13 +127,13 @@ fluid::Side side_of(const cases::FluidSide& side) {
 }
 
 coupling::Water water_of(const cases::Case& c, const cases::Stage& stage, const dem::Scene& scene,
-                         double height, double diameter) {
+                         double height, double diameter, double sauter) {
   coupling::Water w;
   w.present = stage.fluid;
   if (!w.present) return w;
   const cases::Fluid& f = c.fluid;
   w.viscosity = f.viscosity, w.compressibility = f.compressibility;
-  w.k_c = f.permeability_factor > 0 ? f.permeability_factor : diameter * diameter / 180;
+  w.k_c = f.permeability_factor > 0 ? f.permeability_factor : sauter * sauter / 180;
   w.porosity_range = {f.porosity_min, f.porosity_max};
   w.height = f.height > 0 ? f.height : height + f.cell * diameter;
   const bool wall = scene.top_wall.drive != dem::TopWall::Drive::none;
@@ -179,7 +185,7 @@ Stage describe(const cases::Case& c, std::size_t index, const dem::Scene& scene,
   Stage out;
   out.name = stage.name, out.kind = stage.kind, out.scene = scene, out.height_0 = height_0;
   out.diameter = mean_diameter(state);
-  out.water = water_of(c, stage, scene, height_0, out.diameter);
+  out.water = water_of(c, stage, scene, height_0, out.diameter, sauter_diameter(state));
   out.strain_rate = shears(stage.kind) ? scene.shear.velocity / height_0 : stage.strain_rate;
   out.duration = stage.duration > 0 ? stage.duration : stage.strain / std::abs(out.strain_rate);
   out.series_interval = c.output.series_interval, out.snapshot_interval = c.output.snapshot_interval;

@@ -43,7 +43,10 @@ Stage describe(const cases::Case& c, std::size_t index, const dem::Scene& scene,
 std::unique_ptr<coupling::PoreWater> fill(Stage& stage, const dem::State& grains,
                                           const coupling::WaterState& before, bool restart);
 
-double mean_diameter(const dem::State& s);                                    // m
+double mean_diameter(const dem::State& s);  // m
+// m, sum of d^3 over sum of d^2: of equal grains that have the same surface in the same volume. It is this
+// diameter that Kozeny and Carman's permeability has.
+double sauter_diameter(const dem::State& s);
 double step_by_eq_9(const dem::Scene& scene, const dem::State& s, double f);  // s
 
 }  // namespace moraine::run
