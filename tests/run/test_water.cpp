@@ -203,6 +203,42 @@ TEST_F(Water, ChecksACase) {
     EXPECT_NE(o.out.find(word), std::string::npos) << word << "\n" << o.out;
 }
 
+TEST_F(Water, SaysWhatFewCellsCost) {
+  const fs::path wet = make("wet", wet_case());
+  const auto checked = [&](int cells, const char* top) {
+    const Outcome o = moraine({"check", wet.string(), "--threads", "1", "--set", "stages=[\"consolidate\"]",
+                               "--set", "fluid.cells_z=" + std::to_string(cells), "--set",
+                               std::string("stage.consolidate.fluid_top=") + top});
+    EXPECT_EQ(o.status, 0) << o.err;
+    return o.out;
+  };
+  const char* words = "so few over the height even out the pressure";
+  EXPECT_NE(checked(3, "drained").find("even out the pressure 4.57 % too fast (fluid.cells_z = 5: 1.64 %)"),
+            std::string::npos);
+  EXPECT_EQ(checked(5, "drained").find(words), std::string::npos);
+  EXPECT_EQ(checked(3, "impermeable").find(words), std::string::npos);
+}
+
+// Floor, grains and contacts of a record bear the same load, whatever the interval.
+TEST_F(Water, RecordsBearOneLoad) {
+  const fs::path wet = make("wet", wet_case());
+  ASSERT_NO_FATAL_FAILURE(run(wet, {"stages=[\"settle\"]", "stage.settle.fluid=true", "stage.settle.f=0.1",
+                                    "stage.settle.duration=0.3"}));
+  const auto end = output::read_checkpoint(checkpoint_of(wet));
+  ASSERT_GT(end.scene.exchange_interval, 1);
+  const auto grains = open_file(snapshots_of(wet).back()).open_group("grains");
+  double on_grains = 0;
+  std::vector<dem::Vec3d> force;
+  grains.read("force", force);
+  for (const dem::Vec3d& f : force) on_grains += f.z;
+  const double stress = rows_of_stage(wet, 0).back().normal_stress;
+  EXPECT_GT(stress, 0);
+  EXPECT_NEAR(on_grains / end.scene.area() / stress, 1,
+              1e-3);  // damping: velocities of the step, or foreseen
+  const double alone = dem::observe(end.scene, end.state).normal_stress;
+  EXPECT_NE(stress, alone);
+}
+
 // Without the libraries a wet case is refused before anything is written, whichever of its stages is wet.
 TEST_F(Program, RefusesWaterThatIsNotBuilt) {
   if (coupling::water_built()) GTEST_SKIP() << "this build has pore water in it";
