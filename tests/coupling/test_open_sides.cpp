@@ -7,7 +7,7 @@ namespace {
 // Settled between periodic sides that are then taken away: the bed slumps.
 WetBed slumping() {
   static const WetBed bed = make_bed(216, 6, 0);
-  WetBed open = bed;
+  WetBed open{bed.scene, dem::grains_at_rest(bed.state.r, bed.state.x)};  // without contacts across the sides
   open.scene.periodic_x = open.scene.periodic_y = false;
   return open;
 }
@@ -71,7 +71,7 @@ TEST(OpenSides, AGrainFarAwayChangesNothing) {
   EXPECT_EQ(with->fields().porosity, without->fields().porosity);
   EXPECT_EQ(with->fields().permeability, without->fields().permeability);
   EXPECT_NEAR(with->record(false).volume / without->record(false).volume, 1, 1e-12);
-  EXPECT_EQ(with->outside().substr(0, 29), "1 grain beyond x = 0.151 m (0.");
+  EXPECT_NE(with->outside().find("1 grain beyond x = 0.151 m"), std::string::npos) << with->outside();
 }
 
 TEST(OpenSides, WaterTakesThePlaceOfGrainsThatLeave) {
@@ -118,7 +118,7 @@ TEST(OpenSides, WhereTheyAreTightTheBalanceLacksTheGrainsThatLeave) {
 TEST(OpenSides, PushNoGrainOutside) {
   WetBed bed = slumping();
   for (dem::Index i = 0; i < bed.state.size(); ++i)
-    if (i % 3 == 0) bed.state.x[i].x += 0.3;
+    if (i % 3 == 0) bed.state.x[i].x += 0.3;  // leaving no contact that it was in
   Water w = water_with_sides(bed, fluid::Side::Kind::pressure);
   w.sides.low[2] = {fluid::Side::Kind::pressure, 1000};
   WetRun run(bed, w);

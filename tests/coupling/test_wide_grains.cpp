@@ -291,26 +291,5 @@ TEST(WideGrains, GiveTheSameBitsForAnyThreadsAndAfterARestart) {
   }
 }
 
-// How false the pressure is that affine shear makes, as FalseDivergence: a boulder does not follow it but
-// moves as its centre.
-TEST(WideGrains, FalsePressureOfAffineShear) {
-  const auto pressure = [](bool shear) {
-    WetBed bed = boulder_bed();
-    bed.scene.grain = bed.scene.wall = {1e-6, 0, 0, 0, 0, 0};
-    bed.scene.top_wall = {}, bed.scene.floor = false;
-    for (dem::Index i = 0; i < bed.state.size(); ++i)
-      bed.state.v[i] = {shear ? bed.state.x[i].z : 0, 0, shear ? 0 : -bed.state.x[i].z};
-    Water w = water_over(bed, bed.state.wall_z);
-    w.sides = {};
-    WetRun run(bed, w);
-    run.advance(20);
-    double sum = 0;
-    for (const double p : run.water->fields().pressure) sum += p * p;
-    return std::sqrt(sum);
-  };
-  std::printf("false pressure of shear: %.4f of that of compression\n", pressure(true) / pressure(false));
-  EXPECT_LT(pressure(true) / pressure(false), 0.05);
-}
-
 }  // namespace
 }  // namespace moraine::coupling

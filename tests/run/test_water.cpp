@@ -194,6 +194,77 @@ TEST_F(Water, WarnsOfCellsThatMeasurePores) {
   EXPECT_NE(o.out.find("measure pores"), std::string::npos) << o.out;
 }
 
+TEST_F(Water, WarnsOfGrainsLargerThanCells) {
+  const fs::path wet = make("wet", wet_case());
+  const auto check = [&](const char* spread) {
+    return moraine({"check", wet.string(), "--threads", "1", "--set", "grains.radius_mean=0.01", "--set",
+                    std::string("grains.radius_std=") + spread})
+        .out;
+  };
+  const std::string equal = check("0"), mixed = check("0.01");
+  EXPECT_EQ(equal.find("the largest grain ("), std::string::npos) << equal;
+  for (const char* word :
+       {"the largest grain (", "is wider than the grid cells of", "m along z", "expected cells of at least"})
+    EXPECT_NE(mixed.find(word), std::string::npos) << mixed;
+  EXPECT_EQ(mixed.find("measure pores"), std::string::npos) << mixed;
+}
+
+TEST(SauterDiameter, IsOfVolumeOverSurface) {
+  dem::State s;
+  s.r.assign(1000, 0.01), s.r.push_back(0.1);
+  EXPECT_NEAR(run::sauter_diameter(s), 2 * (1000e-6 + 1e-3) / (1000e-4 + 1e-2), 1e-15);
+  EXPECT_NEAR(run::mean_diameter(s), 2 * 10.1 / 1001, 1e-15);
+}
+
+TEST_F(Water, TakesTheSauterMeanForPermeability) {
+  const fs::path wet = make("wet", wet_case());
+  const Outcome o = moraine({"check", wet.string(), "--threads", "1", "--set", "fluid.permeability_factor=0",
+                             "--set", "grains.radius_std=0.005"});
+  ASSERT_EQ(o.status, 0) << o.err;
+  const auto number = [&](const std::string& after) {
+    const auto at = o.out.find(after);
+    return at == std::string::npos ? 0.0 : std::stod(o.out.substr(at + after.size()));
+  };
+  const double mean = number("mean diameter "), sauter = number("Sauter mean diameter d = "),
+               k_c = number("k_c ");
+  EXPECT_GT(sauter, 1.01 * mean) << o.out;
+  EXPECT_NEAR(k_c / (sauter * sauter / 180), 1, 0.01) << o.out;  // three digits
+}
+
+// The bed slumps over sides that hold nothing.
+TEST_F(Water, SaysThatGrainsLeaveByOpenSides) {
+  const fs::path open = make("open", "stages = [\"settle\"]\n" + wet_case());
+  const std::vector<std::string> with{"stage.settle.fluid=true", "box.periodic=y", "fluid.x_low=pressure",
+                                      "fluid.x_high=pressure"};
+  ASSERT_NO_FATAL_FAILURE(run(open, with));
+  const std::string log = contents(open / "output/log.txt");
+  for (const char* word :
+       {"warning: stage settle: the sides x = 0 and x = ", "(box.periodic = \"y\")",
+        "expected box.periodic = \"xy\"", "warning: outside the water: ", "beyond x = 0 m"})
+    EXPECT_NE(log.find(word), std::string::npos) << word << "\n" << log;
+  for (const char* word : {"sides y = 0", "no_flow", "no water can take"})
+    EXPECT_EQ(log.find(word), std::string::npos) << word << "\n" << log;
+  const auto rows = rows_of_stage(open, 0);
+  EXPECT_GT(rows.back().water_volume, rows.front().water_volume);
+  EXPECT_LT(std::abs(rows.back().water_balance), 1e-12 * rows.back().water_volume);
+}
+
+TEST_F(Water, WarnsOfTightSidesThatHoldNoGrains) {
+  const fs::path open = make("open", wet_case());
+  const Outcome o = moraine({"check", open.string(), "--threads", "1", "--set", "box.periodic=x"});
+  ASSERT_EQ(o.status, 0) << o.err;
+  EXPECT_NE(o.out.find("where fluid.y_low and fluid.y_high = \"no_flow\""), std::string::npos) << o.out;
+}
+
+TEST_F(Water, WarnsOfGrainsAboveTheGrid) {
+  const fs::path wet = make("wet", "stages = [\"settle\"]\n" + wet_case());
+  const Outcome o = moraine({"check", wet.string(), "--threads", "1", "--set", "stage.settle.fluid=true",
+                             "--set", "fluid.height=0.1"});
+  ASSERT_EQ(o.status, 0) << o.err;
+  for (const char* word : {"outside the grid of the water", "beyond z = 0.1 m", "fluid.height"})
+    EXPECT_NE(o.out.find(word), std::string::npos) << o.out;
+}
+
 TEST_F(Water, ChecksACase) {
   const fs::path wet = make("wet", wet_case());
   const Outcome o = moraine({"check", wet.string(), "--threads", "1"});
