@@ -41,13 +41,21 @@ double ball_beyond(double a) {
   return a <= -1 ? unit_ball : pi / 3 * (1 - a) * (1 - a) * (2 + a);
 }
 
+// A plane that misses the ball leaves fewer; one beyond the centre leaves what its mirror image takes.
 double ball_beyond(double a, double b) {
+  if (a >= 1 || b >= 1) return 0;
+  if (a <= -1) return ball_beyond(b);
+  if (b <= -1) return ball_beyond(a);
   if (a < 0) return ball_beyond(b) - ball_beyond(-a, b);
   if (b < 0) return ball_beyond(a) - ball_beyond(a, -b);
   return a * a + b * b < 1 ? 2 * corner(a, b, 0) : 0;
 }
 
 double ball_beyond(double a, double b, double c) {
+  if (a >= 1 || b >= 1 || c >= 1) return 0;
+  if (a <= -1) return ball_beyond(b, c);
+  if (b <= -1) return ball_beyond(a, c);
+  if (c <= -1) return ball_beyond(a, b);
   if (a < 0) return ball_beyond(b, c) - ball_beyond(-a, b, c);
   if (b < 0) return ball_beyond(a, c) - ball_beyond(a, -b, c);
   if (c < 0) return ball_beyond(a, b) - ball_beyond(a, b, -c);
@@ -67,23 +75,25 @@ double ball_in_box(const dem::Vec3d& low, const dem::Vec3d& high) {
 void BallParts::cut(const fluid::Grid& grid, const Holds& holds, const dem::Vec3d& x, double r) {
   volume_ = 0, whole_ = true;
   for (int a = 0; a < 3; ++a) {
-    const double h = grid.h(a);
+    const double h = grid.h(a), last = grid.n[a];
     double low = std::floor((x[a] - r) / h), high = std::ceil((x[a] + r) / h);  // planes around the ball
-    if (!grid.periodic[a]) {
-      const double last = grid.n[a];
+    if (!grid.periodic[a] && (low < 0 || high > last)) {
       if ((high <= 0 && !holds.low[a]) || (low >= last && !holds.high[a])) return;
+      whole_ = whole_ && (low >= 0 || holds.low[a]) && (high <= last || holds.high[a]);
       low = std::clamp(low, 0.0, last - 1), high = std::clamp(high, low + 1, last);
     }
     first_[a] = static_cast<int>(low), count_[a] = static_cast<int>(high - low);
-    planes_[a].resize(count_[a] + 1);
-    for (int k = 0; k <= count_[a]; ++k)
-      planes_[a][k] = std::clamp(((first_[a] + k) * h - x[a]) / r, -1.0, 1.0);
-    if (holds.low[a] && first_[a] == 0) planes_[a].front() = -1;
-    if (holds.high[a] && high == grid.n[a]) planes_[a].back() = 1;
-    whole_ = whole_ && count_[a] == 1 && planes_[a][0] == -1 && planes_[a][1] == 1;
+    whole_ = whole_ && count_[a] == 1;
   }
   volume_ = dem::sphere_volume(r);
   if (whole_) return;
+  for (int a = 0; a < 3; ++a) {
+    planes_[a].resize(count_[a] + 1);
+    for (int k = 0; k <= count_[a]; ++k)
+      planes_[a][k] = std::clamp(((first_[a] + k) * grid.h(a) - x[a]) / r, -1.0, 1.0);
+    if (holds.low[a] && first_[a] == 0) planes_[a].front() = -1;
+    if (holds.high[a] && first_[a] + count_[a] == grid.n[a]) planes_[a].back() = 1;
+  }
   beyond_.clear();
   for (const double c : planes_[2])
     for (const double b : planes_[1])

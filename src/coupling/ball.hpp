@@ -30,8 +30,7 @@ class BallParts {
   template <class Visit>
   void each(Visit&& visit) const {
     if (volume_ == 0) return;
-    if (count_[0] * count_[1] * count_[2] == 1 && whole_)
-      return visit(first_[0], first_[1], first_[2], volume_);
+    if (whole_) return visit(first_[0], first_[1], first_[2], volume_);
     for (int k = 0; k < count_[2]; ++k)
       for (int j = 0; j < count_[1]; ++j)
         for (int i = 0; i < count_[0]; ++i)

@@ -120,19 +120,20 @@ void Mapping::find_bearing(const fluid::Grid& grid, const dem::GrainRow* grains,
                            const std::vector<double>& squeeze) {
   const std::size_t n = stencils_.size();
   // The mean stress in a grain is some sum of forces over its area, so that grains of all sizes compare.
-  const auto stress = [&](std::size_t i) { return squeeze[i] / (grains[i].r * grains[i].r); };
+  std::vector<double> stress(n);
+  for (std::size_t i = 0; i < n; ++i) stress[i] = squeeze[i] / (grains[i].r * grains[i].r);
   std::vector<double> solid(grid.cells(), 0), sum(grid.cells(), 0);  // m3; and times the stress
   for (std::size_t i = 0; i < n; ++i)
     for (int e = 0; e < 8; ++e) {
       const double v = volume_[i] * stencils_[i].w[e];
-      solid[stencils_[i].point[e]] += v, sum[stencils_[i].point[e]] += v * stress(i);
+      solid[stencils_[i].point[e]] += v, sum[stencils_[i].point[e]] += v * stress[i];
     }
   for (const WideParts& w : spreads_)
     for (std::size_t k = w.first; k < w.end; ++k)
-      solid[spread_[k].face] += spread_[k].m.m0, sum[spread_[k].face] += spread_[k].m.m0 * stress(w.grain);
+      solid[spread_[k].face] += spread_[k].m.m0, sum[spread_[k].face] += spread_[k].m.m0 * stress[w.grain];
   const auto bears = [&](std::size_t i, double around) {
     const bool held = grains[i].inverse_inertia == 0;
-    return held || (squeeze[i] > 0 && stress(i) >= loose_below * around);
+    return held || (squeeze[i] > 0 && stress[i] >= loose_below * around);
   };
   bears_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -149,7 +150,7 @@ void Mapping::find_bearing(const fluid::Grid& grid, const dem::GrainRow* grains,
     for (std::size_t k = w.first; k < w.end; ++k) {
       const double own = spread_[k].m.m0;
       others += own * (solid[spread_[k].face] - own);
-      stresses += own * (sum[spread_[k].face] - own * stress(w.grain));
+      stresses += own * (sum[spread_[k].face] - own * stress[w.grain]);
     }
     bears_[w.grain] = bears(w.grain, others > 0 ? stresses / others : 0);
   }

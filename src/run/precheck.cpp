@@ -100,19 +100,22 @@ void check_cells(const Stage& stage, const dem::State& s, std::vector<std::strin
   const double length[3] = {stage.scene.box.x, stage.scene.box.y, wall ? stage.height_0 : stage.water.height};
   const auto largest = static_cast<dem::Index>(std::max_element(s.r.begin(), s.r.end()) - s.r.begin());
   const double d = 2 * s.r[largest];
+  int narrowest = 0;
+  const auto width = [&](int a) { return length[a] / stage.water.cells[a]; };
   for (int a = 0; a < 3; ++a) {
-    const double h = length[a] / stage.water.cells[a];
-    if (h < 2 * stage.diameter)
-      warnings.push_back(text(
-          "stage ", stage.name, ": grid cells of ", h, " m along ", "xyz"[a], " are ", h / stage.diameter,
-          " mean diameters wide and measure pores rather than porosity; expected 2 to 3"));
-    if (h < d)
-      warnings.push_back(text(
-          "stage ", stage.name, ": the largest grain (", s.id[largest], "), of ", d,
-          " m, is wider than the grid cells of ", h, " m along ", "xyz"[a],
-          ": cells that it fills count with fluid.porosity_min = ", stage.water.porosity_range[0],
-          "; expected cells of at least ", d, " m, unless the flow around large grains is to be resolved"));
+    if (width(a) < width(narrowest)) narrowest = a;
+    if (width(a) < 2 * stage.diameter)
+      warnings.push_back(
+          text("stage ", stage.name, ": grid cells of ", width(a), " m along ", "xyz"[a], " are ",
+               width(a) / stage.diameter,
+               " mean diameters wide and measure pores rather than porosity; expected 2 to 3"));
   }
+  if (width(narrowest) < d)
+    warnings.push_back(text(
+        "stage ", stage.name, ": the largest grain (", s.id[largest], "), of ", d,
+        " m, is wider than the grid cells of ", width(narrowest), " m along ", "xyz"[narrowest],
+        ": cells that it fills count with fluid.porosity_min = ", stage.water.porosity_range[0],
+        "; expected cells of at least ", d, " m, unless the flow around large grains is to be resolved"));
 }
 
 // There are no walls along x and y.

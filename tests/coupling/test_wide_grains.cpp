@@ -1,6 +1,8 @@
 // Grains larger than cells: porosity against points, flow against bounds, and what the coupling keeps.
 #include <functional>
 
+#include "coupling/mapping.hpp"
+#include "dem/engine_parts.hpp"
 #include "wet_scenes.hpp"
 
 namespace moraine::coupling {
@@ -148,6 +150,22 @@ TEST(WideGrains, PorosityAndFlowAtAnySizeRatio) {
 TEST(WideGrains, PorosityAndFlowOfFiveAmongMany) {
   const WetBed bed = strewn(radii(0.06, 5, 0.01, 1500), {0.34, 0.34, 0.3}, 3);
   expect_exact(bed, water_over(bed, 0.3), "5 of 0.06 m among 1500 of 0.01 m");
+}
+
+// Weights take no more of the space about a face than there is.
+TEST(WideGrains, FillNoMoreThanTheSpace) {
+  const WetBed bed = strewn(radii(0.06, 5, 0.01, 1500), {0.34, 0.34, 0.3}, 3);
+  const std::vector<dem::GrainRow> rows = dem::grain_rows(bed.scene, bed.state);
+  fluid::Grid grid;
+  grid.n = {6, 6, 6}, grid.length = {0.34, 0.34, 0.3};
+  Mapping mapping;
+  mapping.build(grid, {}, rows.data(), bed.state.x, std::vector<double>(rows.size(), 1),
+                std::vector<bool>(rows.size(), false));
+  double most = 0;
+  for (const auto& axis : mapping.solid_fraction())
+    for (const double psi : axis) most = std::max(most, psi);
+  EXPECT_GT(most, 0.8);
+  EXPECT_LE(most, 1);
 }
 
 // The boulders of a pressed bed, sheared.
