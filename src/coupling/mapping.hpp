@@ -16,6 +16,13 @@
 // off) they count like all others: in part once more than 0.4 of the solids about a face are loose, fully
 // from 0.6 on.
 //
+// A grain of at least a cell's width or so (wide_from) would make more of a face than there is room for: it
+// goes by its parts in the eighths of the cells it covers, exactly cut (ball.hpp), each of them with hats
+// about the middle of its eighth and with the displacement of the grain. No eighth holds more than its
+// volume, so nor does the space about a face.
+//
+// What of a grain lies beyond a side that does not hold it back counts nowhere (Outside).
+//
 // The weights stay as they are until grains have moved by a hundredth of a cell (PoreWater); so long the sums
 // are products with a sparse matrix, by chunk of grains (grain.hpp) and within it over eight faces at a time.
 #pragma once
@@ -24,34 +31,36 @@
 #include <vector>
 
 #include "backend/number.hpp"
+#include "coupling/ball.hpp"
+#include "coupling/hats.hpp"
 #include "dem/grain.hpp"
 #include "fluid/grid.hpp"
 
 namespace moraine::coupling {
 
-using dem::Index;
-
 // A number for each face of each axis.
 using Faces = std::array<std::vector<double>, 3>;
+
+// Solids beyond the low and the high side of each axis.
+struct Outside {
+  std::array<std::array<double, 2>, 3> volume{};  // m3
+  std::array<std::array<Index, 2>, 3> grains{};   // that are wholly there
+};
+
+// What the sides of the grid do.
+struct SidesOf {
+  std::array<bool, 3> open_low{}, open_high{};  // water passes; solids may be pushed there, too
+  Holds holds;                                  // grains do not pass
+};
 
 class Mapping {
  public:
   static constexpr double psi_min = 0.1;
-  static constexpr double loose_below = 0.1;  // of the mean squeeze around it a grain is loose
+  static constexpr double loose_below = 0.1;  // of the mean stress around it a grain is loose
+  static constexpr double wide_from = 0.4;    // of the least width of a cell, radius
 
-  // The eight points around a grain.
-  struct Stencil {
-    std::array<Index, 8> point;  // the first names them all
-    std::array<double, 8> w;     // hats, later weights b in m2
-    double xi[3][2];             // from the lower and the higher points of each axis, in cells
-
-    dem::Vec3d from(int e) const { return {xi[0][e & 1], xi[1][(e >> 1) & 1], xi[2][e >> 2]}; }
-  };
-
-  // squeeze: m, sum of the overlaps of each grain, by which loose ones are told. open_low, open_high: of
-  // each axis, whether water passes its sides; solids may be pushed there, too.
-  void build(const fluid::Grid& grid, const std::array<bool, 3>& open_low,
-             const std::array<bool, 3>& open_high, const dem::GrainRow* grains,
+  // squeeze: m, sum of the overlaps of each grain, by which loose ones are told.
+  void build(const fluid::Grid& grid, const SidesOf& sides, const dem::GrainRow* grains,
              const std::vector<dem::Vec3d>& x, const std::vector<double>& squeeze,
              const std::vector<bool>& top_layer);
   // Displacements are counted from here, memory order.
@@ -78,7 +87,8 @@ class Mapping {
   const Faces& solid_fraction() const {
     return psi_;
   }  // 1, about each face; psi_min at least where grains are
-  const std::vector<double>& porosity() const { return phi_; }  // of each cell, by hats about its centre
+  const std::vector<double>& porosity() const { return phi_; }  // of each cell, exactly
+  const Outside& outside() const { return outside_; }
 
  private:
   // Weights of a grain for the eight faces around it along each axis, in units of scale() and rounded to 16
@@ -97,27 +107,66 @@ class Mapping {
     std::array<Index, 4> slot;  // of the chunk's own sums, for two faces each
   };
   using Two = std::array<double, 2>;
+  // A grain's weight for one face, by the chunk's list of those, in units of scale().
+  struct Share {
+    Index slot;
+    double b;
+  };
+  struct Wide {
+    Index grain;
+    std::array<std::array<Index, 2>, 3> shares;  // first and end, of each axis
+  };
   struct alignas(64) Chunk {
     Index begin, end;                              // grains
     std::vector<Octet> octets;                     // of all axes, one after another
     std::array<Index, 4> first_octet, first_slot;  // of each axis
     std::vector<std::array<Index, 2>> face;        // of each slot: neighbours along x
     std::vector<Two> sum;
+    std::vector<Wide> wide;
+    std::vector<Share> share;
+    std::vector<Index> wide_face;  // of all axes, one after another
+    std::array<Index, 4> first_wide_face;
+    std::vector<double> wide_sum;
     double moved = 0;
   };
+  // A wide grain's part in an eighth of a cell.
+  struct Part {
+    dem::Vec3d x;  // of the eighth's centre, m
+    double v;      // m3
+  };
+  struct WideParts {
+    Index grain;
+    std::size_t first, end;  // of parts_, then of spread_ for one axis
+  };
+  // What of a wide grain lies about a face, later its weight there.
+  struct Spread {
+    Index face;
+    Moments m;
+    double b;
+  };
+  void cut(const fluid::Grid& grid, const Holds& holds, const dem::GrainRow* grains,
+           const std::vector<dem::Vec3d>& x);
+  double clip(const fluid::Grid& grid, const Holds& holds, const dem::Vec3d& x, double r);
+  void put_hats(const fluid::Grid& grid, int axis, const std::vector<dem::Vec3d>& x);
   void find_bearing(const fluid::Grid& grid, const dem::GrainRow* grains, const std::vector<double>& squeeze);
   void weigh(const fluid::Grid& grid, int axis, bool open_low, bool open_high);
   void round(int axis, const std::vector<bool>& top_layer);
   void lay_out(int axis);
+  void lay_out_wide(int axis);
   template <class Displacement>
   void add_up(Index chunk, double unit, Displacement&& displacement);
 
   std::vector<Chunk> chunks_;
   std::vector<Weights> weights_;   // memory order, as the next four
   std::vector<Stencil> stencils_;  // of cells, then of one axis after another while weights are made
-  std::vector<double> volume_;     // m3
+  std::vector<double> volume_;     // m3, that goes by the grain's own stencil: of wide grains none
   std::vector<char> bears_;        // whether, or it is loose
   std::vector<Pack> last_;         // m
+  std::vector<WideParts> wide_, spreads_;
+  std::vector<Part> parts_;
+  std::vector<Spread> spread_;
+  BallParts ball_;
+  Outside outside_;
   Faces layer_, psi_, scale_;
   std::vector<double> phi_;
 };

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "coupling/mapping.hpp"
+#include "coupling/wall_gap.hpp"
 #include "dem/engine_parts.hpp"
 #include "dem/spectrum.hpp"
 #include "dem/touching.hpp"
@@ -22,6 +23,7 @@ constexpr double map_lasts = 0.01;  // of a cell, that grains may move before th
 constexpr double most_of_limit =
     0.9;  // of the step at which grains and water would swing up: contacts come and go
 constexpr int power_iterations = 60;
+constexpr double tolerable = 0.02;  // of error_of_few_cells(), to say nothing
 
 // Means over what each cell of a grid of `to` cells covers of one of `from`, in parts of their lengths.
 std::vector<double> on_another_grid(std::vector<double> p, const std::vector<std::int32_t>& from,
@@ -105,15 +107,19 @@ class GridWater final : public PoreWater {
     for (std::size_t i = 0; i < x.size(); ++i) x[i] = grains[i].x;
     // The sum of the largest ways is longer than that of any grain.
     double moved = 0;
-    for (std::size_t i = 0; i < x.size(); ++i)
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      if (outside(x[i], grains[i].r) && outside(now_.x_map[i], grains[i].r)) continue;
       for (int a = 0; a < 3; ++a) moved = std::max(moved, std::abs(x[i][a] - now_.x_map[i][a]));
+    }
     if (has_wall(scene_)) moved += std::abs(drive.wall_z - now_.height_map);
     if (moved < 0.5 * map_lasts * least_cell()) {
       now_.moved = moved;
       return;
     }
     if (has_wall(scene_)) grid_.length[2] = drive.wall_z;
+    const Outside before = mapping_.outside();
     map(x);
+    book(before);
     mapping_.start_from(last);
   }
 
@@ -227,6 +233,27 @@ class GridWater final : public PoreWater {
     return out.str();
   }
 
+  std::string outside() const override {
+    const Outside& out = mapping_.outside();
+    std::ostringstream text;
+    text.precision(3);
+    for (int a = 0; a < 3; ++a)
+      for (const bool high : {false, true}) {
+        const int count = out.grains[a][high];
+        if (out.volume[a][high] == 0) continue;
+        text << (text.tellp() > 0 ? "; " : "");
+        if (count > 0)
+          text << count << (count == 1 ? " grain" : " grains");
+        else
+          text << "parts of grains";
+        text << " beyond "
+             << "xyz"[a] << " = " << (high ? grid_.length[a] : 0) << " m (" << out.volume[a][high]
+             << " m3 of solids)";
+        if (side(a, high).kind == fluid::Side::Kind::closed) text << ", where no water can take their place";
+      }
+    return text.str();
+  }
+
   std::string describe() const override {
     double d = 0;
     for (const double v : volume_) d += 2 * std::cbrt(v * 3 / (4 * std::numbers::pi));
@@ -241,6 +268,13 @@ class GridWater final : public PoreWater {
     else
       out << interval_ << " steps";
     out << " (at most " << stability_.longest << ")";
+    if (const double error = error_of_few_cells(water_); error > tolerable) {
+      Water enough = water_;
+      while (error_of_few_cells(enough) > tolerable) ++enough.cells[2];
+      out << "; so few over the height even out the pressure " << 100 * error
+          << " % too fast (fluid.cells_z = " << enough.cells[2] << ": " << 100 * error_of_few_cells(enough)
+          << " %)";
+    }
     return out.str();
   }
 
@@ -305,12 +339,13 @@ class GridWater final : public PoreWater {
 
   // New weights and all that follows from where grains are.
   void map(const std::vector<Vec3d>& x) {
-    std::array<bool, 3> low, high;
+    SidesOf sides;
     for (int a = 0; a < 3; ++a) {
-      low[a] = side(a, false).kind != fluid::Side::Kind::closed;
-      high[a] = side(a, true).kind != fluid::Side::Kind::closed;
+      sides.open_low[a] = side(a, false).kind != fluid::Side::Kind::closed;
+      sides.open_high[a] = side(a, true).kind != fluid::Side::Kind::closed;
     }
-    mapping_.build(grid_, low, high, grains_.data(), x, squeeze(x), top_layer_);
+    sides.holds = holds();
+    mapping_.build(grid_, sides, grains_.data(), x, squeeze(x), top_layer_);
     now_.x_map = x, now_.height_map = grid_.length[2], now_.moved = 0;
     medium_.viscosity = water_.viscosity, medium_.compressibility = water_.compressibility;
     medium_.porosity = mapping_.porosity();
@@ -318,9 +353,31 @@ class GridWater final : public PoreWater {
     for (std::size_t c = 0; c < grid_.cells(); ++c) {
       double& phi = medium_.porosity[c];
       phi = std::clamp(phi, water_.porosity_range[0], water_.porosity_range[1]);
-      medium_.permeability[c] = water_.k_c * phi * phi * phi / ((1 - phi) * (1 - phi));
+      medium_.permeability[c] = kozeny_carman(water_.k_c, phi);
     }
+    if (scene_.floor) medium_.gap[2][0] = wall_gap(grid_, grains_.data(), x, water_.porosity_range, false);
+    if (has_wall(scene_)) medium_.gap[2][1] = wall_gap(grid_, grains_.data(), x, water_.porosity_range, true);
     step_.set(grid_, medium_);
+  }
+
+  Holds holds() const { return {{false, false, scene_.floor}, {false, false, has_wall(scene_)}}; }
+  bool outside(const Vec3d& x, double r) const {
+    const Holds held = holds();
+    for (int a = 0; a < 3; ++a)
+      if (!grid_.periodic[a] &&
+          ((!held.low[a] && x[a] + r < 0) || (!held.high[a] && x[a] - r > grid_.length[a])))
+        return true;
+    return false;
+  }
+  // Where grains have left since, U counted volume through the side of which the grains' own was no water.
+  // By a tight side no water comes for them: the balance then lacks it.
+  void book(const Outside& before) {
+    for (int a = 0; a < 3; ++a)
+      for (const bool high : {false, true}) {
+        if (grid_.periodic[a] || side(a, high).kind == fluid::Side::Kind::closed) continue;
+        double& drained = a < 2 ? now_.drained_sides : high ? now_.drained_top : now_.drained_bottom;
+        drained -= mapping_.outside().volume[a][high] - before.volume[a][high];
+      }
   }
 
   // m, sum of each grain's overlaps, as good as that of its normal forces.
@@ -355,6 +412,7 @@ class GridWater final : public PoreWater {
 
   double water_volume() const {
     double volume = scene_.area() * (has_wall(scene_) ? now_.wall_z : grid_.length[2]) - solids_;
+    for (const auto& axis : mapping_.outside().volume) volume += axis[0] + axis[1];
     double stored = 0;
     for (const double q : now_.q) stored += q;
     return volume + stored;
@@ -409,8 +467,10 @@ class GridWater final : public PoreWater {
           const fluid::Side& s = side(a, high);
           double beyond = p[c];
           if (s.kind == fluid::Side::Kind::pressure) beyond = s.at(t);
+          const fluid::WallGap& gap = medium_.gap[a][high];
           if (s.kind == fluid::Side::Kind::flux)
-            beyond = p[c] + s.at(t) * water_.viscosity * stride / medium_.permeability[c];
+            beyond =
+                p[c] + s.at(t) * water_.viscosity * (stride - gap.width) / (gap.k * medium_.permeability[c]);
           g_[a][f] += high ? -beyond : beyond;
         };
         const auto last = [&](int axis) { return axis == a ? 1 : grid_.n[axis]; };
@@ -538,7 +598,7 @@ class GridWater final : public PoreWater {
   std::vector<bool> top_layer_;
   std::vector<dem::GrainRow> grains_;  // as of the weights
   dem::TouchingPairs touching_;
-  double solids_ = 0;  // m3
+  double solids_ = 0;  // m3, of all grains
   Faces u_, g_, before_;
   Faces push_;  // g_ for Mapping::push
   std::vector<double> div_u_;
@@ -549,6 +609,14 @@ class GridWater final : public PoreWater {
 };
 
 }  // namespace
+
+double error_of_few_cells(const Water& w) {
+  const auto drained = [](const fluid::Side& s) { return s.kind == fluid::Side::Kind::pressure; };
+  const bool top = w.top == TopSide::drained && drained(w.sides.high[2]), bottom = drained(w.sides.low[2]);
+  if (!top && !bottom) return 0;
+  const double n = top && bottom ? 0.5 * w.cells[2] : w.cells[2], angle = std::numbers::pi / (2 * n);
+  return angle * angle / 6;
+}
 
 bool water_built() { return true; }
 

@@ -41,11 +41,20 @@ class PoreWater : public dem::Surroundings {
   // Pressures over all cells, or over the upper half of their levels, where a sheared bed deforms.
   virtual WaterRecord record(bool upper_half) const = 0;
   virtual std::string solver() const = 0;  // as used so far, e.g. "pcg, jacobi: 6.2 iterations a solve"
+  // What lies outside the grid, by side, e.g. "3 grains beyond x = 0.2 m (1e-05 m3 of solids)"; empty:
+  // nothing.
+  virtual std::string outside() const = 0;
   virtual std::string describe()
       const = 0;  // e.g. "water: 8 x 8 x 7 cells of 0.105 m (2.6 d), exchange every step, pcg"
 };
 
 constexpr double bytes_a_cell = 600;  // measured, without what CHOLMOD fills in
+
+// By what part pressures that drain through floor or top even out too fast on a grid of so few cells, 0 where
+// they do not drain there: (pi/2n)^2/6 over n cells from the closed end, or the middle, to a drained one.
+// Hats spread the pressure of a cell over its neighbours, the grains store less for it (- (pi/2n)^2/4), and
+// the flow between centres makes up for a third.
+double error_of_few_cells(const Water& water);
 
 // Whether this build has pore water in it (MORAINE_FLUID).
 bool water_built();

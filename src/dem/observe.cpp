@@ -35,13 +35,6 @@ Velocities at_step(const Scene& scene, const State& s) {
   return w;
 }
 
-struct WallForce {
-  Index i;
-  WallName wall;
-  double f_n;      // N
-  Vec3d f;         // N, on the grain
-  double delta_n;  // m
-};
 std::vector<WallForce> wall_forces(const Scene& scene, const State& s, const Velocities& at) {
   std::vector<WallForce> out;
   const Drive drive = drive_of(scene, s);
@@ -55,6 +48,21 @@ std::vector<WallForce> wall_forces(const Scene& scene, const State& s, const Vel
                    at_wall(g.x.z, g.r, top ? drive.wall_z : 0.0, top ? -1.0 : 1.0).delta_n});
   }
   return out;
+}
+
+// Adds to `sum` what the next step has, both sorted by key; those that neither had before come in between.
+template <class Force, class Key, class Add>
+void merge(std::vector<Force>& sum, const std::vector<Force>& next, Key&& key, Add&& add) {
+  std::vector<Force> out;
+  out.reserve(std::max(sum.size(), next.size()));
+  auto a = sum.begin();
+  for (const Force& b : next) {
+    while (a != sum.end() && key(*a) < key(b)) out.push_back(*a++);
+    out.push_back(b);
+    if (a != sum.end() && key(*a) == key(b)) add(out.back(), *a++);
+  }
+  out.insert(out.end(), a, sum.end());
+  sum = std::move(out);
 }
 
 }  // namespace
@@ -88,18 +96,49 @@ void mark_slipping(const Scene& scene, State& s) {
   }
 }
 
-std::vector<double> grain_pressure(const Scene& scene, const State& s) {
+Loads loads_of(const Scene& scene, const State& s) {
+  return {contact_forces(scene, s), wall_forces(scene, s, at_step(scene, s)), s.force, s.wall_force,
+          s.shear_force};
+}
+
+Loads mean(const std::vector<Loads>& steps) {
+  Loads sum = steps.front();
+  if (steps.size() == 1) return sum;
+  for (std::size_t k = 1; k < steps.size(); ++k) {
+    const Loads& next = steps[k];
+    merge(
+        sum.contacts, next.contacts, [](const ContactForce& c) { return std::pair(c.i, c.j); },
+        [](ContactForce& to, const ContactForce& c) {
+          to.f_n += c.f_n, to.f_t += c.f_t, to.overlap += c.overlap;
+        });
+    merge(
+        sum.walls, next.walls, [](const WallForce& w) { return std::pair(w.wall, w.i); },
+        [](WallForce& to, const WallForce& w) { to.f_n += w.f_n, to.f += w.f, to.delta_n += w.delta_n; });
+    for (std::size_t i = 0; i < sum.force.size(); ++i) sum.force[i] += next.force[i];
+    sum.wall_force += next.wall_force, sum.shear_force += next.shear_force;
+  }
+  const double share = 1 / static_cast<double>(steps.size());
+  for (ContactForce& c : sum.contacts) c.f_n = share * c.f_n, c.f_t = share * c.f_t, c.overlap *= share;
+  for (WallForce& w : sum.walls) w.f_n *= share, w.f = share * w.f, w.delta_n *= share;
+  for (Vec3d& f : sum.force) f = share * f;
+  sum.wall_force *= share, sum.shear_force *= share;
+  return sum;
+}
+
+std::vector<double> grain_pressure(const State& s, const Loads& loads) {
   std::vector<double> sum(s.size(), 0);
-  for (const ContactForce& c : contact_forces(scene, s)) {
+  for (const ContactForce& c : loads.contacts) {
     const double f = std::sqrt(dot(c.f_n, c.f_n));
     sum[c.i] += f, sum[c.j] += f;
   }
-  for (const WallForce& w : wall_forces(scene, s, at_step(scene, s))) sum[w.i] += w.f_n;
+  for (const WallForce& w : loads.walls) sum[w.i] += w.f_n;
   for (Index i = 0; i < s.size(); ++i) sum[i] /= 4 * std::numbers::pi * s.r[i] * s.r[i];
   return sum;
 }
 
-Observation observe(const Scene& scene, const State& s) {
+Observation observe(const Scene& scene, const State& s) { return observe(scene, s, loads_of(scene, s)); }
+
+Observation observe(const Scene& scene, const State& s, const Loads& loads) {
   Observation o;
   const double area = scene.area();
   const bool has_wall = scene.top_wall.drive != TopWall::Drive::none;
@@ -108,40 +147,46 @@ Observation observe(const Scene& scene, const State& s) {
   const std::vector<WallForce> walls = wall_forces(scene, s, at);
 
   double floor_force = 0;
-  for (const WallForce& w : walls)
+  for (const WallForce& w : loads.walls)
     if (w.wall == WallName::floor) floor_force += w.f.z;
   double water_on_layer = 0;
   for (Index i = 0; i < static_cast<Index>(s.water_force.size()); ++i)
     if (s.role[i] == Role::top) water_on_layer += s.water_force[i].x;
-  o.shear_stress = -(s.shear_force + water_on_layer) / area;
-  o.normal_stress = (has_wall ? s.wall_force : floor_force) / area;
+  o.shear_stress = -(loads.shear_force + water_on_layer) / area;
+  o.normal_stress = (has_wall ? loads.wall_force : floor_force) / area;
 
   double volume = 0;
+  const auto inside = [&](const Vec3d& x) {  // or gone by an open side
+    return (scene.periodic_x || (x.x >= 0 && x.x <= scene.box.x)) &&
+           (scene.periodic_y || (x.y >= 0 && x.y <= scene.box.y));
+  };
   for (Index i = 0; i < s.size(); ++i) {
-    volume += sphere_volume(s.r[i]);
+    if (inside(s.x[i])) volume += sphere_volume(s.r[i]);
     o.height = std::max(o.height, s.x[i].z + s.r[i]);
   }
   if (has_wall) o.height = s.wall_z;
   o.porosity = 1 - volume / (area * (scene.periodic_z ? scene.box.z : o.height));
 
-  Energy& e = o.energy;
   double normal_force = 0;
-  for (const ContactForce& c : contacts) {
+  for (const ContactForce& c : loads.contacts) {
     o.mean_overlap += c.overlap;
     o.max_overlap = std::max(o.max_overlap, c.overlap);
     normal_force += std::sqrt(dot(c.f_n, c.f_n));
-    e.elastic_normal += 0.5 * scene.grain.k_n * c.overlap * c.overlap;
   }
+  if (!loads.contacts.empty()) {
+    const auto count = static_cast<double>(loads.contacts.size());
+    o.mean_overlap /= count;
+    o.coordination = 2.0 * count / s.size();
+    normal_force /= count;
+  }
+
+  Energy& e = o.energy;
+  for (const ContactForce& c : contacts) e.elastic_normal += 0.5 * scene.grain.k_n * c.overlap * c.overlap;
   for (const Contact& c : s.contacts)
     e.elastic_tangential += 0.5 * scene.grain.k_t * dot(c.delta_t, c.delta_t);
   for (const WallForce& w : walls) e.elastic_normal += 0.5 * scene.wall.k_n * w.delta_n * w.delta_n;
   for (const WallContact& w : s.wall_contacts)
     e.elastic_tangential += 0.5 * scene.wall.k_t * dot(w.delta_t, w.delta_t);
-  if (!contacts.empty()) {
-    o.mean_overlap /= static_cast<double>(contacts.size());
-    o.coordination = 2.0 * static_cast<double>(contacts.size()) / s.size();
-    normal_force /= static_cast<double>(contacts.size());
-  }
 
   double net = 0;
   Index free = 0;
@@ -156,7 +201,8 @@ Observation observe(const Scene& scene, const State& s) {
     e.rotational += 0.5 * inertia * before_times_after(s.omega[i], at.omega[i]);
     if (s.role[i] != Role::free) continue;
     e.potential += m * scene.submerged_gravity() * s.x[i].z;
-    const Vec3d a = mob.acceleration(s.water_force.empty() ? s.force[i] : s.force[i] + s.water_force[i]);
+    const Vec3d a =
+        mob.acceleration(s.water_force.empty() ? loads.force[i] : loads.force[i] + s.water_force[i]);
     net += m * std::sqrt(dot(a, a));
     ++free;
   }

@@ -21,6 +21,35 @@ struct Energy {
   }
 };
 
+// Grain contacts with their forces, sorted by (i, j).
+struct ContactForce {
+  Index i, j;      // memory order
+  Vec3d point;     // m
+  Vec3d f_n, f_t;  // N, on i
+  double overlap;  // m, positive
+};
+struct WallForce {
+  Index i;
+  WallName wall;
+  double f_n;      // N
+  Vec3d f;         // N, on the grain
+  double delta_n;  // m
+};
+
+// What contacts bear, at one step or as the mean over several: where grains meet pore water every m > 1
+// steps, its push of m steps comes at one, grains swing about their place from one exchange to the next, and
+// the forces at the exchange alone are off by what the swing takes up. Over all m steps they balance.
+struct Loads {
+  std::vector<ContactForce> contacts;  // that touched at any of the steps; `point` where they last did
+  std::vector<WallForce> walls;        // likewise
+  std::vector<Vec3d> force;            // N, on each grain, by contacts; memory order
+  double wall_force = 0;               // N, of the grains on the top wall, upwards
+  double shear_force = 0;              // N, sum of x forces of the grains on the top layer
+};
+Loads loads_of(const Scene& scene, const State& staggered);
+Loads mean(const std::vector<Loads>& steps);  // at least one; a single one keeps its bits
+
+// Forces, overlaps and the number of contacts are those of `loads`, all else that of the state.
 struct Observation {
   double shear_stress = 0;   // Pa, -(x force on the top layer)/area
   double normal_stress = 0;  // Pa, force on the top wall/area (on the floor where there is no top wall)
@@ -32,15 +61,10 @@ struct Observation {
       0;  // mean net force on free grains (gravity included) / mean normal contact force
   Energy energy;
 };
-Observation observe(const Scene& scene, const State& staggered);
+Observation observe(const Scene& scene, const State& staggered, const Loads& loads);
+Observation observe(const Scene& scene, const State& staggered);  // loads of the step alone
 
-// Grain contacts with their forces at step n, in the order of state.contacts.
-struct ContactForce {
-  Index i, j;      // memory order
-  Vec3d point;     // m
-  Vec3d f_n, f_t;  // N, on i
-  double overlap;  // m, positive
-};
+// At step n, in the order of state.contacts.
 std::vector<ContactForce> contact_forces(const Scene& scene, const State& staggered);
 
 // Notes which grain contacts slip, after steps without softening, which do not tell: those whose tangential
@@ -48,7 +72,7 @@ std::vector<ContactForce> contact_forces(const Scene& scene, const State& stagge
 void mark_slipping(const Scene& scene, State& staggered);
 
 // Sum of |f_n| on each grain over its surface, Pa (the pressure of Fig. 5); memory order, walls included.
-std::vector<double> grain_pressure(const Scene& scene, const State& staggered);
+std::vector<double> grain_pressure(const State& state, const Loads& loads);
 
 // Velocities at step n (mean of n - 1/2 and n + 1/2).
 std::vector<Vec3d> velocity(const Scene& scene, const State& staggered);

@@ -1,5 +1,6 @@
 #include "fluid/darcy.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "error.hpp"
@@ -72,18 +73,32 @@ void Darcy::set(const Grid& grid, const Medium& m) {
       refuse("permeability", m.permeability[c], "m2, 0 or more and finite");
   }
 
+  for (int a = 0; a < 3; ++a)
+    for (const WallGap& gap : m.gap[a])
+      if (!(gap.k > 0) || !std::isfinite(gap.k) || !(gap.width >= 0 && gap.width < 0.5 * grid.h(a)))
+        throw error("pore water: a gap of ", gap.width, " m beside a side of ", axis_name[a], ", and ", gap.k,
+                    " of the permeability behind it; expected 0 to less than half a cell, and more than 0");
+
   grid_ = grid;
   ++version_;
   const double volume = grid.cell_volume();
   for (std::size_t c = 0; c < cells; ++c) storage_[c] = m.compressibility * m.porosity[c] * volume;
   for (int a = 0; a < 3; ++a) {
     const double factor = grid.face_area(a) / (m.viscosity * grid.h(a));
-    const auto& k = m.permeability;
+    const auto& gap = m.gap[a];
+    std::vector<double> k = m.permeability;
+    if (!grid.periodic[a]) {
+      const bool both = grid.n[a] == 1;
+      const double low = both ? std::min(gap[0].k, gap[1].k) : gap[0].k;
+      each_side_cell(a, false, [&](std::size_t c, std::size_t) { k[c] *= low; });
+      if (!both) each_side_cell(a, true, [&](std::size_t c, std::size_t) { k[c] *= gap[1].k; });
+    }
     each_face(a, [&](int, std::size_t f, std::size_t low, std::size_t high) {
       double& T = transmissibility_[a][f];
       if (low == no_cell || high == no_cell) {
         const Side& side = low == no_cell ? sides_.low[a] : sides_.high[a];
-        T = side.kind == Side::Kind::pressure ? 2 * factor * k[low == no_cell ? high : low] : 0;
+        const double way = 0.5 - gap[low == no_cell ? 0 : 1].width / grid.h(a);  // in cells
+        T = side.kind == Side::Kind::pressure ? factor / way * k[low == no_cell ? high : low] : 0;
       } else {
         const double sum = k[low] + k[high];
         T = sum > 0 ? factor * (2 * k[low] * (k[high] / sum)) : 0;

@@ -4,8 +4,9 @@
 //
 // C = beta phi V, m3/Pa. k_f: harmonic mean of both cells' k; l: distance of centres. A side of given
 // pressure lies half a cell from the centre and counts in L with its T, in b with T p_side; a side of given
-// flux counts in b alone; a closed one nowhere. L is symmetric. SI throughout. Throws Error for sides that
-// contradict themselves and for a medium that is impossible, naming the cell.
+// flux counts in b alone; a closed one nowhere. Beside a wall k_f and l leave its gap out (WallGap). L is
+// symmetric. SI throughout. Throws Error for sides that contradict themselves and for a medium that is
+// impossible, naming the cell.
 #pragma once
 #include <array>
 #include <cstdint>

@@ -18,12 +18,20 @@
 
 namespace moraine::fluid {
 
+// A layer of cells beside a wall whose mean porosity is that of a bed and of a gap between bed and wall: flow
+// towards the wall meets the bed, and then nothing.
+struct WallGap {
+  double k = 1;      // permeability of the bed over that of the cells
+  double width = 0;  // m, of the way from the centres to the wall that does not resist
+};
+
 // What fills the cells.
 struct Medium {
-  double viscosity = 1.8e-3;         // Pa s, mu_f
-  double compressibility = 4.5e-10;  // 1/Pa, beta
-  std::vector<double> porosity;      // 1, phi of each cell
-  std::vector<double> permeability;  // m2, k of each cell
+  double viscosity = 1.8e-3;                    // Pa s, mu_f
+  double compressibility = 4.5e-10;             // 1/Pa, beta
+  std::vector<double> porosity;                 // 1, phi of each cell
+  std::vector<double> permeability;             // m2, k of each cell
+  std::array<std::array<WallGap, 2>, 3> gap{};  // at the low and high side of each axis
 };
 
 enum class SolverChoice { automatic, pcg, cholmod };

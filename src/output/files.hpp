@@ -74,7 +74,8 @@ class Series {
 std::vector<Row> read_series(const std::filesystem::path& path);
 
 // snapshots/NAME.h5, grains in the order of their ids, contacts with force vectors; attributes time, stage,
-// step. All datasets carry `units`. NAME comes from stage and number: e.g. 02-shear-000040.h5.
+// step. All datasets carry `units`. NAME comes from stage and number: e.g. 02-shear-000040.h5. loads: the
+// forces to write; null: those of the step alone.
 struct SnapshotInfo {
   std::string file;  // name within snapshots/
   double time;       // s, since the case began
@@ -84,7 +85,8 @@ struct SnapshotInfo {
 };
 SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::string& name, double time,
                             const dem::Scene& scene, const dem::State& staggered,
-                            const std::optional<coupling::WaterFields>& water = {});
+                            const std::optional<coupling::WaterFields>& water = {},
+                            const dem::Loads* loads = nullptr);
 // snapshots/grains.xdmf and snapshots/contacts.xdmf: time series for ParaView (XDMF 3, Polyvertex with a
 // radius; contacts as points with force vectors). With pore water also water.xdmf, the grid's cells, and
 // bed.xdmf, grains and grid together. Rewritten whole; of snapshots of one time it lists the last.

@@ -45,7 +45,8 @@ std::vector<std::size_t> sorted_rows(std::size_t count, Less less) {
   return rows;
 }
 
-void write_grains(const hdf5::Group& grains, const dem::Scene& scene, const dem::State& state) {
+void write_grains(const hdf5::Group& grains, const dem::Scene& scene, const dem::State& state,
+                  const dem::Loads& loads) {
   const auto rows = sorted_rows(state.id.size(), [&](auto a, auto b) { return state.id[a] < state.id[b]; });
   std::vector<Vec3d> displacement = state.x;
   for (std::size_t k = 0; k < displacement.size(); ++k) displacement[k] -= state.x_start[k];
@@ -58,15 +59,15 @@ void write_grains(const hdf5::Group& grains, const dem::Scene& scene, const dem:
   grains.write("velocity", arrange(dem::velocity(scene, state), rows), "m/s");
   grains.write("spin", arrange(state.omega, rows), "rad/s");
   grains.write("rotation", arrange(state.rotation, rows), "rad");
-  grains.write("force", arrange(state.force, rows), "N");  // by contacts; without gravity
+  grains.write("force", arrange(loads.force, rows), "N");  // by contacts; without gravity
   if (!state.water_force.empty()) grains.write("water_force", arrange(state.water_force, rows), "N");
-  grains.write("pressure", arrange(dem::grain_pressure(scene, state), rows), "Pa");
+  grains.write("pressure", arrange(dem::grain_pressure(state, loads), rows), "Pa");
 }
 
 // Grains by their ids, i < j, sorted: the file does not depend on the memory order. Forces are on i.
-std::int64_t write_contacts(const hdf5::Group& group, const dem::Scene& scene, const dem::State& state) {
+std::int64_t write_contacts(const hdf5::Group& group, const dem::Scene& scene, const dem::State& state,
+                            std::vector<dem::ContactForce> contacts) {
   using dem::ContactForce;
-  std::vector<ContactForce> contacts = dem::contact_forces(scene, state);
   for (ContactForce& c : contacts) {
     c.i = state.id[static_cast<std::size_t>(c.i)];
     c.j = state.id[static_cast<std::size_t>(c.j)];
@@ -247,7 +248,7 @@ std::string wet_xdmf(const std::vector<SnapshotInfo>& snapshots, bool with_grain
 
 SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::string& name, double time,
                             const dem::Scene& scene, const dem::State& staggered,
-                            const std::optional<coupling::WaterFields>& water) {
+                            const std::optional<coupling::WaterFields>& water, const dem::Loads* mean) {
   const hdf5::Lock lock;
   SnapshotInfo info{name + ".h5", time, staggered.size(), 0};
   const auto file = hdf5::File::in_memory(directory / info.file);
@@ -258,8 +259,9 @@ SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::s
   file.set("stage_time", scene.time(staggered.step));
   file.set("box", scene.box);
   file.set("top_wall", staggered.wall_z);
-  write_grains(file.create_group("grains"), scene, staggered);
-  info.contacts = write_contacts(file.create_group("contacts"), scene, staggered);
+  const dem::Loads loads = mean ? *mean : dem::loads_of(scene, staggered);
+  write_grains(file.create_group("grains"), scene, staggered, loads);
+  info.contacts = write_contacts(file.create_group("contacts"), scene, staggered, loads.contacts);
   if (water) write_water(file.create_group("water"), *water, info);
   write_text(directory / info.file, file.sealed("snapshot", 1));
   return info;

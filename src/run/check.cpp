@@ -52,12 +52,18 @@ void print_water(const cases::Case& c, const Stage& stage, const dem::State& s,
   const double m = modulus(c, s, 1 - phi, stage.diameter), storage = phi * w.compressibility;
   const double d = k / (w.viscosity * storage), c_v = k / (w.viscosity * (1 / m + storage));
   const coupling::Stability stability = water.stability();
-  const double h = height / w.cells[2], interval = stage.scene.dt * static_cast<double>(water.interval());
+  const bool wall = stage.scene.top_wall.drive != dem::TopWall::Drive::none;
+  const double h = (wall ? height : w.height) / w.cells[2],
+               interval = stage.scene.dt * static_cast<double>(water.interval());
   std::printf("    %s\n", water.describe().c_str());
-  std::printf("    cells       %.3g d wide, %.3g d high\n", stage.scene.box.x / w.cells[0] / stage.diameter,
-              h / stage.diameter);
+  const double largest = 2 * *std::max_element(s.r.begin(), s.r.end());
+  std::printf("    cells       %.3g d wide, %.3g d high; the largest grain is %.3g d\n",
+              stage.scene.box.x / w.cells[0] / stage.diameter, h / stage.diameter, largest / stage.diameter);
   std::printf("    exchange    every %.4g s; stable up to %.4g s (contacts %.3g rad/s, water %.3g rad/s)\n",
               interval, stability.longest_dt, stability.w_sk, stability.w_f);
+  if (c.fluid.permeability_factor == 0)
+    std::printf("    k_c         %.3g m2 = d^2/180 with the Sauter mean diameter d = %.4g m\n", w.k_c,
+                sauter_diameter(s));
   std::printf(
       "    water       k = %.3g m2 at porosity %.3g; D = k/(mu phi beta) = %.3g m2/s; diffusion number "
       "%.3g\n",

@@ -120,7 +120,8 @@ bool Guard::finds_healthy(const dem::State& s) const {
 }
 
 void Guard::check_energy(const dem::State& s) {
-  const output::Row now = row_of(static_cast<std::size_t>(first_.stage), stage_, s, start_);
+  const output::Row now =
+      row_of(static_cast<std::size_t>(first_.stage), stage_, s, dem::loads_of(stage_.scene, s), start_);
   most_put_in_ = std::max(most_put_in_, energy_put_in({first_, now}));
   // Rounding of the potential energy may exceed what a bed at rest has stored.
   const double had = stored_at_least(first_) + most_put_in_ + 1e-10 * std::abs(first_.potential);

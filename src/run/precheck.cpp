@@ -97,15 +97,50 @@ void check_margin(const Stage& stage, const dem::State& s, std::vector<std::stri
                             " m, or 0 for an automatic one"));
 }
 
-void check_cells(const Stage& stage, std::vector<std::string>& warnings) {
+void check_cells(const Stage& stage, const dem::State& s, std::vector<std::string>& warnings) {
   if (!stage.water.present) return;
   const bool wall = stage.scene.top_wall.drive != dem::TopWall::Drive::none;
   const double length[3] = {stage.scene.box.x, stage.scene.box.y, wall ? stage.height_0 : stage.water.height};
-  for (int a = 0; a < 3; ++a)
-    if (const double h = length[a] / stage.water.cells[a]; h < 2 * stage.diameter)
-      warnings.push_back(text(
-          "stage ", stage.name, ": grid cells of ", h, " m along ", "xyz"[a], " are ", h / stage.diameter,
-          " mean diameters wide and measure pores rather than porosity; expected 2 to 3"));
+  const auto largest = static_cast<dem::Index>(std::max_element(s.r.begin(), s.r.end()) - s.r.begin());
+  const double d = 2 * s.r[largest];
+  int narrowest = 0;
+  const auto width = [&](int a) { return length[a] / stage.water.cells[a]; };
+  for (int a = 0; a < 3; ++a) {
+    if (width(a) < width(narrowest)) narrowest = a;
+    if (width(a) < 2 * stage.diameter)
+      warnings.push_back(
+          text("stage ", stage.name, ": grid cells of ", width(a), " m along ", "xyz"[a], " are ",
+               width(a) / stage.diameter,
+               " mean diameters wide and measure pores rather than porosity; expected 2 to 3"));
+  }
+  if (width(narrowest) < d)
+    warnings.push_back(text(
+        "stage ", stage.name, ": the largest grain (", s.id[largest], "), of ", d,
+        " m, is wider than the grid cells of ", width(narrowest), " m along ", "xyz"[narrowest],
+        ": cells that it fills count with fluid.porosity_min = ", stage.water.porosity_range[0],
+        "; expected cells of at least ", d, " m, unless the flow around large grains is to be resolved"));
+}
+
+// There are no walls along x and y.
+void check_sides(const cases::Case& c, const Stage& stage, std::vector<std::string>& warnings) {
+  if (!stage.water.present) return;
+  for (int a = 0; a < 2; ++a) {
+    if (a == 0 ? stage.scene.periodic_x : stage.scene.periodic_y) continue;
+    const auto tight = [&](const fluid::Side& side) { return side.kind == fluid::Side::Kind::closed; };
+    const bool low = tight(stage.water.sides.low[a]), high = tight(stage.water.sides.high[a]);
+    const std::string key = std::string("fluid.") + "xy"[a];
+    warnings.push_back(text("stage ", stage.name, ": the sides ", "xy"[a], " = 0 and ", "xy"[a], " = ",
+                            stage.scene.box[a], " m are open (box.periodic = \"",
+                            c.periodic_x   ? "x"
+                            : c.periodic_y ? "y"
+                                           : "none",
+                            "\"): a grain that leaves counts no longer, and water takes its place",
+                            low || high ? text(", but not where ", low ? key + "_low" : "",
+                                               low && high ? " and " : "", high ? key + "_high" : "",
+                                               " = \"no_flow\": there the balance of the water lacks it")
+                                        : "",
+                            "; expected box.periodic = \"xy\", or a bed that stays inside"));
+  }
 }
 
 // Of the grid of any stage, before hours are spent on those before it. Loose grains stand higher than the bed
@@ -150,11 +185,17 @@ std::vector<std::string> precheck(const cases::Case& c, const Start& start, dem:
     }
     check_step(stage, s, warnings);
     check_margin(stage, s, warnings);
-    check_cells(stage, warnings);
+    check_cells(stage, s, warnings);
+    check_sides(c, stage, warnings);
     check_room(c, stage, s);
     // Refuses what is impossible; a later stage of loose grains is judged when it comes, with its bed.
     std::unique_ptr<coupling::PoreWater> water;
     if (bed || !coupling::water_built()) water = fill(stage, s, now.water, stage.goes_on);
+    if (water && !water->outside().empty())
+      warnings.push_back(text("stage ", stage.name, ": outside the grid of the water lie at the start ",
+                              water->outside(),
+                              "; they count nowhere; expected all grains inside (box.x, "
+                              "box.y, fluid.height)"));
     if (k > 0) continue;
     engine.load(stage.scene, s, water.get());
     check_overlaps(c, stage.scene, engine.state());

@@ -24,9 +24,9 @@ std::vector<output::Row> rows_of_stage(std::size_t stage, const std::vector<outp
 
 }  // namespace
 
-output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s,
+output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, const dem::Loads& loads,
                    const output::StageStart& start) {
-  const dem::Observation o = dem::observe(stage.scene, s);
+  const dem::Observation o = dem::observe(stage.scene, s, loads);
   const dem::Energy& e = o.energy;
   const dem::Ledger &l = s.ledger, &l_0 = start.ledger;
   output::Row row{};

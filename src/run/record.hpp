@@ -9,8 +9,8 @@
 
 namespace moraine::run {
 
-// start: what the row counts from.
-output::Row row_of(std::size_t index, const Stage& stage, const dem::State& state,
+// loads: dem/observe.hpp; start: what the row counts from.
+output::Row row_of(std::size_t index, const Stage& stage, const dem::State& state, const dem::Loads& loads,
                    const output::StageStart& start);
 // What pore water adds to a row.
 void add_water(output::Row& row, const Stage& stage, const coupling::PoreWater& water,

@@ -198,6 +198,7 @@ class Runner {
         follow_bed(stage);
       }
       begin(stage);
+      loads_ = dem::loads_of(stage.scene, now_.state);
       record(stage);
       snapshot(stage);
       if (case_.automatic_dt && stage.goes_on) follow_bed(stage);  // as after any record
@@ -212,6 +213,7 @@ class Runner {
                   stage.goes_on && !resuming ? "; goes on as the one before" : "");
     progress_->say(text);
     if (water_) progress_->say(water_->describe() + "; " + stability_of(*water_, stage.scene.dt));
+    said_outside_.clear();
     progress_->begin(stage.name, step - stage.first_step, steps, 0);
 
     Guard guard(case_.guards, stage, now_.rows, now_.start);
@@ -224,15 +226,13 @@ class Runner {
       if (case_.automatic_dt) until = std::min(until, estimate);
       until = at_exchange(stage, until);
       const auto began = Clock::now();
-      engine_->advance(until - step);
+      const bool due = until == event.step;
+      due ? advance_to_record(stage, until - step) : engine_->advance(until - step);
       if (seconds_since(began) < 0.1 && until == step + slice) slice *= 2;
       step = until;
-      const bool due = step == event.step;
       ended = due && event.end;
-      if (due || step == look) {
-        take_state();
-        guard.check(now_.state);
-      }
+      if (step == look && !due) take_state();
+      if (due || step == look) guard.check(now_.state);
       if (due) {
         if (event.series) record(stage);
         if (event.snapshot) snapshot(stage);
@@ -242,6 +242,7 @@ class Runner {
       const std::int64_t done = step - stage.first_step;
       if (options_.on_progress) options_.on_progress(index, done, std::max<std::int64_t>(done, steps));
       progress_->show({done, stage.time(step), now_.rows.back().unbalanced_force});
+      if (water_ && (due || step == look)) say_outside(ended);
       if (ended && water_) progress_->say("water, " + water_->solver());
       const bool stop = stop_requested;
       if (stop || ended || seconds_since(saved_) > case_.output.checkpoint_interval) {
@@ -280,8 +281,32 @@ class Runner {
     now_.scene = stage.scene;
   }
 
+  // With pore water the last interval between exchanges step by step, for the mean loads over it. Same bits
+  // as in one go.
+  void advance_to_record(const Stage& stage, std::int64_t steps) {
+    const std::int64_t m = std::max<std::int64_t>(1, stage.scene.exchange_interval);
+    std::vector<dem::Loads> last;
+    engine_->advance(m > 1 ? steps - m : steps);
+    for (std::int64_t k = 1; k < m; ++k) {
+      engine_->advance(1);
+      last.push_back(dem::loads_of(stage.scene, engine_->state()));
+    }
+    if (m > 1) engine_->advance(1);
+    take_state();
+    last.push_back(dem::loads_of(stage.scene, now_.state));
+    loads_ = dem::mean(last);
+  }
+
+  // When the first grains leave, and how many have at the end.
+  void say_outside(bool ended) {
+    const std::string outside = water_->outside();
+    if (outside.empty() || outside == said_outside_ || !(said_outside_.empty() || ended)) return;
+    progress_->say("warning: outside the water: " + outside);
+    said_outside_ = outside;
+  }
+
   void record(const Stage& stage) {
-    now_.rows.push_back(row_of(static_cast<std::size_t>(now_.stage), stage, now_.state, now_.start));
+    now_.rows.push_back(row_of(static_cast<std::size_t>(now_.stage), stage, now_.state, loads_, now_.start));
     if (water_) add_water(now_.rows.back(), stage, *water_, now_.start);
     if (!water_ && case_.has_water()) now_.rows.back().total_friction = now_.rows.back().shear_friction;
     series_->append(now_.rows.back());
@@ -296,9 +321,9 @@ class Runner {
     const auto number = std::count_if(now_.snapshots.begin(), now_.snapshots.end(),
                                       [&](const auto& s) { return s.file.starts_with(beginning); });
     std::snprintf(name, sizeof name, "%s%06lld", beginning.c_str(), static_cast<long long>(number));
-    now_.snapshots.push_back(output::write_snapshot(files_.snapshots(), name, now_.rows.back().time,
-                                                    stage.scene, now_.state,
-                                                    water_ ? std::optional(water_->fields()) : std::nullopt));
+    now_.snapshots.push_back(
+        output::write_snapshot(files_.snapshots(), name, now_.rows.back().time, stage.scene, now_.state,
+                               water_ ? std::optional(water_->fields()) : std::nullopt, &loads_));
     all_listed_ = false;
   }
 
@@ -327,11 +352,13 @@ class Runner {
   Files files_;
   Start start_;
   output::Checkpoint now_;
+  dem::Loads loads_;  // of the step, or with pore water over the interval, that led to the present record
   std::unique_ptr<coupling::PoreWater> water_;  // of the present stage
   std::unique_ptr<dem::Engine> engine_;
   std::unique_ptr<Progress> progress_;
   std::vector<std::string> warnings_, changes_;
-  std::string damage_;  // of the checkpoint that was to be resumed from
+  std::string damage_;        // of the checkpoint that was to be resumed from
+  std::string said_outside_;  // in this stage
   std::unique_ptr<output::Series> series_;
   Clock::time_point saved_ = Clock::now(), next_list_ = saved_;
   bool all_listed_ = true;

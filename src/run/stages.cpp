@@ -74,6 +74,12 @@ output::Checkpoint read_start(const std::filesystem::path& path) {
 
 bool shears(Kind k) { return k == Kind::shear || k == Kind::shear_stress; }
 
+double sauter_diameter(const dem::State& s) {
+  double volume = 0, area = 0;
+  for (const double r : s.r) volume += r * r * r, area += r * r;
+  return 2 * volume / area;
+}
+
 // dt = f sqrt(min m / max k), eq. 9; the walls count among the k.
 double step_by_eq_9(const dem::Scene& scene, const dem::State& s, double f) {
   const double m = dem::sphere_mass(scene.density, *std::min_element(s.r.begin(), s.r.end()));
@@ -130,13 +136,14 @@ fluid::Side side_of(const cases::FluidSide& side) {
 }
 
 coupling::Water water_of(const cases::Case& c, const cases::Stage& stage, const dem::Scene& scene,
-                         double height, double diameter) {
+                         double height, const dem::State& s) {
   coupling::Water w;
   w.present = stage.fluid;
   if (!w.present) return w;
   const cases::Fluid& f = c.fluid;
+  const double diameter = mean_diameter(s), sauter = sauter_diameter(s);
   w.viscosity = f.viscosity, w.compressibility = f.compressibility;
-  w.k_c = f.permeability_factor > 0 ? f.permeability_factor : diameter * diameter / 180;
+  w.k_c = f.permeability_factor > 0 ? f.permeability_factor : sauter * sauter / 180;
   w.porosity_range = {f.porosity_min, f.porosity_max};
   w.height = f.height > 0 ? f.height : height + f.cell * diameter;
   const bool wall = scene.top_wall.drive != dem::TopWall::Drive::none;
@@ -176,8 +183,7 @@ bool goes_on(const cases::Case& c, const cases::Stage& stage, const Start& start
   scene.time_0 = before.time_0, scene.step_0 = before.step_0;
   scene.exchange_interval = before.exchange_interval;
   scene.neighbour_margin = before.neighbour_margin;
-  return scene == before &&
-         water_of(c, stage, scene, now.height_0, mean_diameter(now.state)) == now.water_settings;
+  return scene == before && water_of(c, stage, scene, now.height_0, now.state) == now.water_settings;
 }
 
 double nominal_rate(const cases::Stage& stage, const output::Checkpoint& now) {  // 1/s, u/H_0 or axial
@@ -282,7 +288,7 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, outpu
   dem::sort_spatially(scene, s);
   scene.dt = c.automatic_dt ? c.safety * critical_step(scene, s) : step_of(c, stage, scene, s);
   now.scene = scene;
-  now.water_settings = water_of(c, stage, scene, now.height_0, mean_diameter(s));
+  now.water_settings = water_of(c, stage, scene, now.height_0, s);
   now.start = {};
   now.start.end = duration_of(stage, nominal_rate(stage, now));
   Stage out = describe(c, index, now);

@@ -61,6 +61,9 @@ Stage describe(const cases::Case& c, std::size_t index, const output::Checkpoint
 std::unique_ptr<coupling::PoreWater> fill(Stage& stage, const dem::State& grains,
                                           const coupling::WaterState& before, bool under_way);
 
+// m, sum of d^3 over sum of d^2: of equal grains that have the same surface in the same volume. It is this
+// diameter that Kozeny and Carman's permeability has.
+double sauter_diameter(const dem::State& s);
 double step_by_eq_9(const dem::Scene& scene, const dem::State& s, double f);  // s
 
 }  // namespace moraine::run

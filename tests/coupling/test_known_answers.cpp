@@ -217,6 +217,49 @@ TEST(Terzaghi, ConsolidationOfARandomPacking) {
   }
 }
 
+// 1/s, at which the mean pressure over a closed floor and under a drained top falls once it falls evenly.
+double rate_of_decay(WetRun&& run, double from, double to) {  // s
+  run.advance(std::llround(from / run.scene.dt));
+  const double t_0 = run.scene.time(run.engine->state().step), p_0 = run.water->record(false).mean;
+  run.advance(std::llround((to - from) / run.scene.dt));
+  const double t = run.scene.time(run.engine->state().step);
+  return std::log(p_0 / run.water->record(false).mean) / (t - t_0);
+}
+
+// What describe() states: grains spread the pressure over a cell to either side, and with it the column's
+// storage.
+TEST(Terzaghi, FewCellsEvenOutFasterByWhatIsStated) {
+  const WetBed bed = loaded(Column::bed());
+  constexpr double height = Column::height;
+  const double phi = mean_porosity(bed);
+  Water w = water_over(bed);
+  w.k_c = 4e-11;
+  w.porosity_range = {phi, phi * (1 + 1e-12)};
+  for (const int cells : {2, 3, 5}) {
+    w.cells = {1, 1, cells};
+    WetRun run(bed, w, under_pressure(bed, w, step_of_stress));
+    const double k = run.water->fields().permeability[0];
+    const double time = height * height * w.viscosity * (Column::m_v + phi * w.compressibility) / k;
+    const double fall = rate_of_decay(std::move(run), 0.2 * time, 0.4 * time) * time /
+                        (std::numbers::pi * std::numbers::pi / 4);
+    std::printf("%d cells: %.4f of the rate, stated %.4f\n", cells, fall, 1 + error_of_few_cells(w));
+    EXPECT_NEAR(fall, 1 + error_of_few_cells(w), 0.01) << cells;
+  }
+}
+
+// With the porosity as it is: the gap beside the walls must not pass for wide pores in cells that are high.
+TEST(Terzaghi, FewAndManyCellsAgreeOverARandomPacking) {
+  const WetBed bed = loaded(make_bed(1000, 8, 1e4));
+  const auto rate = [&](int cells) {
+    Water w = water_over(bed);
+    w.cells = {2, 2, cells}, w.k_c = 4e-12;
+    const double fall = rate_of_decay({bed, w, under_pressure(bed, w, step_of_stress)}, 0.1, 0.2);
+    std::printf("%d cells: %.4f 1/s\n", cells, fall);
+    return fall / (1 + error_of_few_cells(w));
+  };
+  EXPECT_NEAR(rate(3) / rate(12), 1, 0.05);
+}
+
 TEST(UndrainedLoading, HasSkemptonsBOfARandomPacking) {
   const WetBed bed = loaded(tall_bed());
   const double m_v = Squeeze(tall_bed()).m_v();
@@ -229,6 +272,37 @@ TEST(UndrainedLoading, HasSkemptonsBOfARandomPacking) {
     const double b = 1 / (1 + mean_porosity(bed) * beta / m_v), p = run.water->record(false).mean;
     std::printf("beta = %g: p/dsigma %.4f, B %.4f\n", beta, p / step_of_stress, b);
     EXPECT_NEAR(p / step_of_stress / b, 1, 0.01) << "beta " << beta << ", B " << b;
+  }
+}
+
+// The water's push of m steps comes at one: what the floor bears at that step is off by the swing.
+TEST(MeanLoads, OverAnIntervalBalance) {
+  WetBed bed = Column::bed();
+  bed.scene.top_wall = {}, bed.scene.gravity = 9.81, bed.scene.fluid_density = 1000;
+  bed.state = at_rest(bed.scene, bed.state);
+  double weight = 0;  // N, submerged
+  for (const double r : bed.state.r)
+    weight += dem::sphere_volume(r) * (bed.scene.density - 1000) * bed.scene.gravity;
+  const double area = bed.scene.area();
+  for (const std::int64_t m : {1, 2, 3}) {
+    Water w = water_over(bed, Column::height);
+    w.k_c = 1e-8, w.interval = m, w.compressibility = 1e-7;
+    w.sides.low[2] = {fluid::Side::Kind::pressure, 0.9 * weight / area};
+    WetRun run(bed, w);
+    run.advance(100000);
+    std::vector<dem::Loads> steps;
+    for (std::int64_t k = 0; k < m; ++k)
+      run.engine->advance(1), steps.push_back(dem::loads_of(run.scene, run.engine->state()));
+    const State s = run.engine->state();
+    double water = 0;
+    for (const Vec3d& f : s.water_force) water += f.z;
+    const double floor = dem::observe(run.scene, s, dem::mean(steps)).normal_stress * area,
+                 at_exchange = dem::observe(run.scene, s).normal_stress * area;
+    std::printf("m = %d: water bears %.5f, the floor %.5f, at the exchange %.5f\n", int(m), water / weight,
+                floor / weight, at_exchange / weight);
+    EXPECT_NEAR((floor + water) / weight, 1, 1e-5) << m;
+    EXPECT_NEAR(floor / weight, 0.1, 1e-3) << m;
+    if (m == 1) EXPECT_EQ(floor, at_exchange);
   }
 }
 

@@ -53,6 +53,21 @@ TEST(SameBitsInWater, ForAnyThreadsAndOnTheGpusLoop) {
   }
 }
 
+TEST(SameBitsInWater, StepByStep) {
+  for (const int m : {2, 3}) {
+    const WetBed bed = sheared(m == 2);
+    Water w = water_over(bed);
+    w.interval = m, w.k_c = 1e-11, w.compressibility = 1e-7;
+    const End whole = after(WetRun(bed, w), 600);
+    for (const auto& [backend, threads] :
+         {std::pair{dem::Backend::cpu, 1}, {dem::Backend::cpu, 2}, {dem::Backend::reference, 1}}) {
+      WetRun run(bed, w, {}, backend, threads);
+      for (int k = 0; k < 600; ++k) run.engine->advance(1), (void)run.engine->state();
+      expect_same(whole, {run.engine->state(), run.water->state()});
+    }
+  }
+}
+
 TEST(SameBitsInWater, AfterARestart) {
   for (const auto& [m, damped] : {std::pair{1, true}, {2, true}, {1, false}}) {
     const WetBed bed = sheared(damped);

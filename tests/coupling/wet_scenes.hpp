@@ -38,9 +38,25 @@ inline State at_rest(const Scene& scene, State s) {
   return s;
 }
 
+// Two boulders of that radius put among the grains in place of those that are in their way.
+inline State with_boulders(const State& s, double radius, double width) {
+  const double height = bed_top(s);
+  std::vector<double> r{radius, radius};
+  std::vector<Vec3d> x{{0.3 * width, 0.3 * width, 0.3 * height}, {0.8 * width, 0.8 * width, 0.6 * height}};
+  for (dem::Index i = 0; i < s.size(); ++i) {
+    const auto free_of = [&](const Vec3d& boulder) {
+      Vec3d d = s.x[i] - boulder;
+      d.x -= width * std::round(d.x / width), d.y -= width * std::round(d.y / width);
+      return dem::length(d) > radius + s.r[i];
+    };
+    if (free_of(x[0]) && free_of(x[1])) r.push_back(s.r[i]), x.push_back(s.x[i]);
+  }
+  return dem::grains_at_rest(r, x);
+}
+
 // Grains of 2 cm settled under gravity, x and y periodic; then, with a stress, pressed by a wall without
 // gravity. At rest.
-inline WetBed make_bed(int count, int columns, double normal_stress) {
+inline WetBed make_bed(int count, int columns, double normal_stress, double boulders = 0) {
   dem::Packing p;
   p.count = count, p.columns_x = p.columns_y = columns;
   p.radius_mean = 0.01, p.radius_std = 0.0008, p.cell = 1.05, p.seed = 5;
@@ -50,7 +66,7 @@ inline WetBed make_bed(int count, int columns, double normal_stress) {
   s.box = {lattice.box_x, lattice.box_y, 1};
   s.grain = s.wall = {1e6, 1e6, 50, 20, 0.3, 0.3};
   s.dt = 0.1 * std::sqrt(dem::mass(s, 0.008) / s.grain.k_n);
-  State state = lattice.state;
+  State state = boulders > 0 ? with_boulders(lattice.state, boulders, lattice.box_x) : lattice.state;
   dem::sort_spatially(s, state);
   const auto engine = dem::make_engine(dem::Backend::cpu, 1);
   state = dem::run(*engine, s, state, 40000);
@@ -75,6 +91,11 @@ inline WetBed make_bed(int count, int columns, double normal_stress) {
 // Some 800 grains pressed at 10 kPa, 0.22 m wide and 0.11 m high.
 inline const WetBed& pressed_bed() {
   static const WetBed bed = make_bed(800, 8, 1e4);
+  return bed;
+}
+// The same with two boulders, as wide as two cells of water_over().
+inline const WetBed& boulder_bed() {
+  static const WetBed bed = make_bed(800, 8, 1e4, 0.045);
   return bed;
 }
 // A column for one-dimensional problems: as many, 0.11 m wide and half a metre high.
@@ -133,6 +154,43 @@ inline WaterState under_pressure(const WetBed& bed, const Water& w, double p) {
     s.q[c] = w.compressibility * phi * f.grid.cell_volume() * p;
   }
   return s;
+}
+
+// By m^3 points in each cell; x and y are periodic where the bed says so.
+inline std::vector<double> sampled_porosity(const WetBed& bed, const fluid::Grid& grid, int m) {
+  const std::array<int, 3> n{grid.n[0] * m, grid.n[1] * m, grid.n[2] * m};
+  std::vector<char> solid(std::size_t(n[0]) * n[1] * n[2], 0);
+  for (dem::Index g = 0; g < bed.state.size(); ++g) {
+    const Vec3d& x = bed.state.x[g];
+    const double r = bed.state.r[g];
+    int low[3], high[3];
+    for (int a = 0; a < 3; ++a) {
+      low[a] = int(std::floor((x[a] - r) / grid.h(a) * m)),
+      high[a] = int(std::ceil((x[a] + r) / grid.h(a) * m));
+      if (!grid.periodic[a]) low[a] = std::max(low[a], 0), high[a] = std::min(high[a], n[a] - 1);
+    }
+    for (int k = low[2]; k <= high[2]; ++k)
+      for (int j = low[1]; j <= high[1]; ++j)
+        for (int i = low[0]; i <= high[0]; ++i) {
+          const Vec3d d{(i + 0.5) * grid.h(0) / m - x.x, (j + 0.5) * grid.h(1) / m - x.y,
+                        (k + 0.5) * grid.h(2) / m - x.z};
+          if (dot(d, d) < r * r)
+            solid[(std::size_t(k) * n[1] + (j % n[1] + n[1]) % n[1]) * n[0] + (i % n[0] + n[0]) % n[0]] = 1;
+        }
+  }
+  std::vector<double> phi(grid.cells(), 1);
+  for (int k = 0; k < n[2]; ++k)
+    for (int j = 0; j < n[1]; ++j)
+      for (int i = 0; i < n[0]; ++i)
+        phi[grid.cell(i / m, j / m, k / m)] -=
+            solid[(std::size_t(k) * n[1] + j) * n[0] + i] / double(m * m * m);
+  return phi;
+}
+
+inline double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
+  double worst = 0;
+  for (std::size_t c = 0; c < a.size(); ++c) worst = std::max(worst, std::abs(a[c] - b[c]));
+  return worst;
 }
 
 }  // namespace moraine::coupling

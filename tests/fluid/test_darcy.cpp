@@ -1,6 +1,7 @@
 // The operator by itself: its matrix-free sweep against sums over faces, on grids with every kind of side.
 #include "fluid/darcy.hpp"
 
+#include "error.hpp"
 #include "fluid/linear_solver.hpp"
 #include "fluid/problems.hpp"
 
@@ -146,6 +147,46 @@ TEST(Darcy, FluxIsOfTheHarmonicMeanOverTheDistance) {
   EXPECT_DOUBLE_EQ(darcy.transmissibility(2)[1], 1.5e-10 * per_k);
   EXPECT_EQ(darcy.transmissibility(2)[2], 0);
   EXPECT_DOUBLE_EQ(darcy.storage()[0], m.compressibility * 0.4 * 0.5 * 0.25 * 0.2);
+}
+
+// A bed of two layers and a gap without resistance, as cells see it: the flux that their resistances in
+// series let through, and no other along the wall.
+TEST(Darcy, GapBesideAWallIsInSeries) {
+  const double k = 1e-10, mu = 1e-3, h = 0.1, width = 0.03, factor = 0.6, drop = 5;
+  for (const int n : {1, 3})
+    for (int a = 0; a < 3; ++a) {
+      Grid grid{{2, 2, 2}, {0.2, 0.2, 0.2}, {true, true, true}};
+      grid.n[a] = n, grid.length[a] = n * h, grid.periodic[a] = false;
+      Sides sides;
+      sides.high[a].kind = sides.low[a].kind = Side::Kind::pressure;
+      sides.low[a].value = drop;
+      Darcy darcy(grid, sides);
+      Medium m = uniform(grid, 0.4, k);
+      m.viscosity = mu;
+      m.gap[a][1] = {factor, width};
+      darcy.set(grid, m);
+      // Steady: cells below the last as they are, the last with the bed's k and a shorter way.
+      const double resistance = mu * ((n - 1) * h / k + (h - width) / (factor * k)), q = drop / resistance;
+      std::vector<double> p(grid.cells());
+      for (std::size_t c = 0; c < p.size(); ++c) {
+        std::array<std::size_t, 3> at{c % grid.n[0], c / grid.n[0] % grid.n[1], c / grid.n[0] / grid.n[1]};
+        const bool last = at[a] + 1 == static_cast<std::size_t>(n);
+        p[c] = last ? q * mu * (0.5 * h - width) / (factor * k) : drop - q * mu * (at[a] + 0.5) * h / k;
+      }
+      std::vector<double> flux(grid.face_count(a));
+      darcy.flux(a, 0, p.data(), flux.data());
+      for (const double f : flux) EXPECT_NEAR(f / (q * grid.face_area(a)), 1, 1e-12) << n << " " << a;
+      const int along = (a + 1) % 3;
+      EXPECT_DOUBLE_EQ(darcy.transmissibility(along)[0], grid.face_area(along) * k / (mu * grid.h(along)));
+    }
+}
+
+TEST(Darcy, RefusesAGapThatIsWiderThanHalfACell) {
+  Grid grid{{2, 2, 2}, {1, 1, 1}, {true, true, false}};
+  Darcy darcy(grid, {});
+  Medium m = uniform(grid, 0.4, 1e-10);
+  m.gap[2][0].width = 0.25;
+  EXPECT_THROW(darcy.set(grid, m), Error);
 }
 
 }  // namespace

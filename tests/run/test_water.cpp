@@ -194,6 +194,81 @@ TEST_F(Water, WarnsOfCellsThatMeasurePores) {
   EXPECT_NE(o.out.find("measure pores"), std::string::npos) << o.out;
 }
 
+TEST_F(Water, WarnsOfGrainsLargerThanCells) {
+  const fs::path wet = make("wet", "stages = [\"settle\"]\n" + wet_case());
+  const auto check = [&](const char* spread) {  // without damping, which the smallest of them would not bear
+    std::vector<std::string> words{"check", wet.string(), "--threads", "1"};
+    for (const char* set : {"fluid=true", "gamma_n=0", "wall_gamma_n=0", "wall_gamma_t=0"})
+      words.insert(words.end(), {"--set", std::string("stage.settle.") + set});
+    words.insert(words.end(),
+                 {"--set", "grains.radius_mean=0.01", "--set", std::string("grains.radius_std=") + spread});
+    return moraine(words).out;
+  };
+  const std::string equal = check("0"), mixed = check("0.01");
+  EXPECT_NE(equal.find("the largest grain is 1 d"), std::string::npos) << equal;
+  EXPECT_EQ(equal.find("the largest grain ("), std::string::npos) << equal;
+  for (const char* word :
+       {"the largest grain (", "is wider than the grid cells of", "m along z", "expected cells of at least"})
+    EXPECT_NE(mixed.find(word), std::string::npos) << mixed;
+  EXPECT_EQ(mixed.find("measure pores"), std::string::npos) << mixed;
+}
+
+TEST(SauterDiameter, IsOfVolumeOverSurface) {
+  dem::State s;
+  s.r.assign(1000, 0.01), s.r.push_back(0.1);
+  EXPECT_NEAR(run::sauter_diameter(s), 2 * (1000e-6 + 1e-3) / (1000e-4 + 1e-2), 1e-15);
+  EXPECT_NEAR(run::mean_diameter(s), 2 * 10.1 / 1001, 1e-15);
+}
+
+TEST_F(Water, TakesTheSauterMeanForPermeability) {
+  const fs::path wet = make("wet", wet_case());
+  const Outcome o = moraine({"check", wet.string(), "--threads", "1", "--set", "fluid.permeability_factor=0",
+                             "--set", "grains.radius_std=0.005"});
+  ASSERT_EQ(o.status, 0) << o.err;
+  const auto number = [&](const std::string& after) {
+    const auto at = o.out.find(after);
+    return at == std::string::npos ? 0.0 : std::stod(o.out.substr(at + after.size()));
+  };
+  const double mean = number("mean diameter "), sauter = number("Sauter mean diameter d = "),
+               k_c = number("k_c ");
+  EXPECT_GT(sauter, 1.01 * mean) << o.out;
+  EXPECT_NEAR(k_c / (sauter * sauter / 180), 1, 0.01) << o.out;  // three digits
+}
+
+// The bed slumps over sides that hold nothing.
+TEST_F(Water, SaysThatGrainsLeaveByOpenSides) {
+  const fs::path open = make("open", "stages = [\"settle\"]\n" + wet_case());
+  const std::vector<std::string> with{"stage.settle.fluid=true", "box.periodic=y", "fluid.x_low=pressure",
+                                      "fluid.x_high=pressure"};
+  ASSERT_NO_FATAL_FAILURE(run(open, with));
+  const std::string log = contents(open / "output/log.txt");
+  for (const char* word :
+       {"warning: stage settle: the sides x = 0 and x = ", "(box.periodic = \"y\")",
+        "expected box.periodic = \"xy\"", "warning: outside the water: ", "beyond x = 0 m"})
+    EXPECT_NE(log.find(word), std::string::npos) << word << "\n" << log;
+  for (const char* word : {"sides y = 0", "no_flow", "no water can take"})
+    EXPECT_EQ(log.find(word), std::string::npos) << word << "\n" << log;
+  const auto rows = rows_of_stage(open, 0);
+  EXPECT_GT(rows.back().water_volume, rows.front().water_volume);
+  EXPECT_LT(std::abs(rows.back().water_balance), 1e-12 * rows.back().water_volume);
+}
+
+TEST_F(Water, WarnsOfTightSidesThatHoldNoGrains) {
+  const fs::path open = make("open", wet_case());
+  const Outcome o = moraine({"check", open.string(), "--threads", "1", "--set", "box.periodic=x"});
+  ASSERT_EQ(o.status, 0) << o.err;
+  EXPECT_NE(o.out.find("where fluid.y_low and fluid.y_high = \"no_flow\""), std::string::npos) << o.out;
+}
+
+TEST_F(Water, WarnsOfGrainsAboveTheGrid) {
+  const fs::path wet = make("wet", "stages = [\"settle\"]\n" + wet_case());
+  const Outcome o = moraine({"check", wet.string(), "--threads", "1", "--set", "stage.settle.fluid=true",
+                             "--set", "fluid.height=0.1"});
+  ASSERT_EQ(o.status, 0) << o.err;
+  for (const char* word : {"outside the grid of the water", "beyond z = 0.1 m", "fluid.height"})
+    EXPECT_NE(o.out.find(word), std::string::npos) << o.out;
+}
+
 TEST_F(Water, ChecksACase) {
   const fs::path wet = make("wet", wet_case());
   const Outcome o = moraine({"check", wet.string(), "--threads", "1"});
@@ -201,6 +276,42 @@ TEST_F(Water, ChecksACase) {
   for (const char* word : {"exchange", "stable up to", "D = k/(mu phi beta)", "diffusion number",
                            "c_v = ", "R = K_f/(phi M)", "Skempton B", "strain rate x H^2/c_v", "drained"})
     EXPECT_NE(o.out.find(word), std::string::npos) << word << "\n" << o.out;
+}
+
+TEST_F(Water, SaysWhatFewCellsCost) {
+  const fs::path wet = make("wet", wet_case());
+  const auto checked = [&](int cells, const char* top) {
+    const Outcome o = moraine({"check", wet.string(), "--threads", "1", "--set", "stages=[\"consolidate\"]",
+                               "--set", "fluid.cells_z=" + std::to_string(cells), "--set",
+                               std::string("stage.consolidate.fluid_top=") + top});
+    EXPECT_EQ(o.status, 0) << o.err;
+    return o.out;
+  };
+  const char* words = "so few over the height even out the pressure";
+  EXPECT_NE(checked(3, "drained").find("even out the pressure 4.57 % too fast (fluid.cells_z = 5: 1.64 %)"),
+            std::string::npos);
+  EXPECT_EQ(checked(5, "drained").find(words), std::string::npos);
+  EXPECT_EQ(checked(3, "impermeable").find(words), std::string::npos);
+}
+
+// Floor, grains and contacts of a record bear the same load, whatever the interval.
+TEST_F(Water, RecordsBearOneLoad) {
+  const fs::path wet = make("wet", wet_case());
+  ASSERT_NO_FATAL_FAILURE(run(wet, {"stages=[\"settle\"]", "stage.settle.fluid=true", "stage.settle.f=0.1",
+                                    "stage.settle.duration=0.3"}));
+  const auto end = output::read_checkpoint(checkpoint_of(wet));
+  ASSERT_GT(end.scene.exchange_interval, 1);
+  const auto grains = open_file(snapshots_of(wet).back()).open_group("grains");
+  double on_grains = 0;
+  std::vector<dem::Vec3d> force;
+  grains.read("force", force);
+  for (const dem::Vec3d& f : force) on_grains += f.z;
+  const double stress = rows_of_stage(wet, 0).back().normal_stress;
+  EXPECT_GT(stress, 0);
+  EXPECT_NEAR(on_grains / end.scene.area() / stress, 1,
+              1e-3);  // damping: velocities of the step, or foreseen
+  const double alone = dem::observe(end.scene, end.state).normal_stress;
+  EXPECT_NE(stress, alone);
 }
 
 // Without the libraries a wet case is refused before anything is written, whichever of its stages is wet.
