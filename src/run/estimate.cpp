@@ -197,12 +197,9 @@ Estimate::Time Estimate::stage(std::size_t index, double duration) {
   if (wanted.normal_stress > 0)  // what the wall has pushed comes to rest in a small part of the stage
     speed = std::max(speed, 0.02 * std::sqrt(wanted.normal_stress / case_.grains.density));
   const double way = top_of(start_.state) - top_of(bed);
-  const bool falls = loose_ && index == 0 && way > 0 && case_.gravity > 0;
-  double each;
-  if (falls)
-    each = falling(stage, bed, way, duration);
-  else
-    each = per_step(stage, bed, speed);
+  const bool falls = loose_ && index == 0 && way > 0 && case_.gravity > 0 &&
+                     stage.scene.top_wall.drive == dem::TopWall::Drive::none;
+  const double each = falls ? falling(stage, bed, way, duration) : per_step(stage, bed, speed);
   return {steps, scale_ * (steps * each + rows(stage, bed, duration))};
 }
 
