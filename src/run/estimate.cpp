@@ -86,9 +86,7 @@ Estimate::Estimate(const cases::Case& c, const Start& start, dem::Engine& engine
       engine_(engine),
       scale_(static_cast<double>(start.state.size()) / start_.state.size()),
       loose_(c.start.empty() && c.floor && !c.periodic_z),
-      packed_(start_.state) {
-  if (loose_) pack();
-}
+      packed_(start_.state) {}
 
 void Estimate::pack() {
   const std::vector<double>& r = start_.state.r;
@@ -189,6 +187,7 @@ double Estimate::processor_time() const {
 
 Estimate::Time Estimate::stage(std::size_t index, double duration) {
   const cases::Stage& wanted = case_.stages[index];
+  if (loose_ && packed_.contacts.empty()) pack();
   dem::State bed = loose_ ? with_contacts(expected_contacts(wanted)) : packed_;
   Stage stage = prepare(case_, index, start_, bed);
   const double steps = std::max(1.0, std::round(duration / stage.scene.dt));

@@ -7,8 +7,8 @@
 // same factor, so that displacements per step, and with them how often neighbours are searched for, are those
 // of the run while a force does next to nothing): a bed made in a moment has not the forces of one at rest.
 //
-// Loose grains settle in three parts of time, T = sqrt(2 D/g) each the first two, D the way down of the
-// highest grain: until T they fall and land, a share (t/T)^2 of them, then they bounce, then they lie.
+// Loose grains settle in three parts: until T = sqrt(2 D/g), D the way down of the highest grain, they fall
+// and land, a share (t/T)^2 of them; for as long again they bounce; then they lie.
 #pragma once
 #include "case/case.hpp"
 #include "dem/engine.hpp"
