@@ -9,6 +9,8 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 from scipy.stats import t as student
 
 from beds import Setting, paper, statistics
@@ -98,6 +100,40 @@ def markdown(entries, about, done, wanted):
     return "\n".join(lines) + "\n"
 
 
+def label(axes, marks, taken, gap=7, fontsize=7):
+    """Names the marks (x, y, name), each where no other mark, name or line is, as near as can be; those farther away have a
+    line to their mark. taken: artists that need their place, too."""
+    figure = axes.figure
+    renderer, points = figure.canvas.get_renderer(), figure.dpi / 72  # pixels to a point
+    places = axes.transData.transform([mark[:2] for mark in marks]) if marks else []
+    boxes = [artist.get_window_extent(renderer) for artist in taken]
+    boxes += [Bbox.from_bounds(*(place - 5 * points), 10 * points, 10 * points) for place in places]
+    for line in axes.lines:  # in small pieces
+        corners = line.get_transform().transform(line.get_xydata())
+        for a, b in zip(corners, corners[1:]):
+            pieces = np.linspace(a, b, max(2, int(np.hypot(*(b - a)) / points)))
+            boxes += [Bbox.from_bounds(*piece, 1, 1) for piece in pieces]
+    angles = np.radians([15, -15, 165, 195, 60, 120, -60, -120, 90, -90])
+    for k in sorted(range(len(marks)), key=lambda k: -places[k][0]):  # from the right, where room is least
+        for distance in np.arange(gap, 100, 3):
+            for angle in angles:
+                shift = distance * np.array([np.cos(angle), np.sin(angle)])
+                text = axes.annotate(marks[k][2], marks[k][:2], xytext=shift, textcoords="offset points", fontsize=fontsize, va="center",
+                                     ha="center" if abs(shift[0]) < 3 else "left" if shift[0] > 0 else "right",
+                                     arrowprops={"arrowstyle": "-", "lw": 0.5, "color": "0.5", "shrinkA": 1, "shrinkB": 4} if distance > 12 else None)
+                text.update_positions(renderer)
+                box = Text.get_window_extent(text, renderer).padded(1.5 * points)
+                if axes.bbox.contains(box.x0, box.y0) and axes.bbox.contains(box.x1, box.y1) and not box.count_overlaps(boxes):
+                    break
+                text.remove()
+            else:
+                continue
+            boxes.append(box)
+            break
+        else:
+            raise RuntimeError(f"no room for the label {marks[k][2]}")
+
+
 def plot(path, smooth, entries, about):
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.8), layout="constrained")
     styles = dict(zip(dict.fromkeys(row["scene"] for row in smooth), ("o-", "s--", "^-.", "D:")))
@@ -114,20 +150,22 @@ def plot(path, smooth, entries, about):
     left.legend(fontsize="small")
 
     tested = [e for e in entries if "tests" in e]
+    marks = []
     for e in tested:
         seen = any(test["verdict"] == "OUTSIDE" for test in e["tests"].values())
         x, y = e["cpu_s_per_strain"], e["largest"]
         right.plot(x, y, "x" if seen else "o", color="0.15", mfc="white", ms=7)
         s = e["setting"]
         parts = [f"f {s.f:g}"] + ([f"k/{s.soft:g}"] if s.soft != 1 else []) + ([f"rate x{s.faster:g}"] if s.faster != 1 else [])
-        right.annotate(", ".join(parts), (x, y), xytext=(6, 3), textcoords="offset points", fontsize=7)
+        marks.append((x, y, ", ".join(parts)))
     front, least = [], math.inf
     for e in sorted(tested, key=lambda e: e["cpu_s_per_strain"]):
         if e["largest"] < least:
             least = e["largest"]
             front.append((e["cpu_s_per_strain"], least))
     if front:
-        right.step(*zip(*front), where="post", color="0.5", lw=1, label="Pareto front")
+        corners = [point for a, b in zip(front, front[1:]) for point in (a, (b[0], a[1]))] + front[-1:]
+        right.plot(*zip(*corners), color="0.5", lw=1, label="Pareto front")
         see = np.median([test["could_see_in_seed_scatter"] for e in tested for test in e["tests"].values()])
         right.axhline(see, color="0.5", ls=":", label="a single statistic's difference that the test\nfinds in 80 % of cases (median)")
         reference = next(e for e in entries if e["setting"] == paper)["cpu_s_per_strain"]
@@ -139,7 +177,12 @@ def plot(path, smooth, entries, about):
                   ylabel="largest difference from paper, s.d. of seeds", title="Sheared beds, statistics over seeds")
         right.set_ylim(top=8 * right.get_ylim()[1])  # room for the legend
         right.legend(fontsize="x-small", loc="upper right")
+        right.set_xlim(right.get_xlim()[0], 2.5 * right.get_xlim()[1])  # and for labels on the right
     figure.suptitle(f"{about['machine'].get('Model name', '')}, {about['date']}, {about['version']}", fontsize=8, color="0.4")
+    figure.set_dpi(130)
+    figure.canvas.draw()  # the layout is fixed before labels look for room
+    figure.set_layout_engine("none")
+    label(right, marks, [right.get_legend()] + right.texts if front else [])
     figure.savefig(path, dpi=130)
     plt.close(figure)
 
@@ -171,3 +214,19 @@ def write(out, command, smooth, runs, wanted):
         {**head, "runs": len(runs), "runs_wanted": wanted, "builds": versions, "settings": plain}, indent=1) + "\n")
     plot(out / "work-precision.png", smooth, entries, head)
     print(text)
+
+
+def read_csv(path):
+    def value(text):
+        try:
+            return float(text)
+        except ValueError:
+            return text
+    with open(path, newline="") as file:
+        return [{k: value(v) for k, v in row.items() if v != ""} for row in csv.DictReader(file)]
+
+
+def redraw(out, stem):
+    """The plot alone, of the numbers that lie in `out`."""
+    about = json.loads((out / f"{stem}.json").read_text())
+    plot(out / f"{stem}.png", read_csv(out / f"{stem}-smooth.csv"), settings_of(read_csv(out / f"{stem}-beds.csv")), about)

@@ -5,7 +5,8 @@ from itertools import groupby
 
 import numpy as np
 
-from . import compaction, measure, paper, profile, rotation, strength
+from . import compaction, measure, paper, profile, rotation, shearing, strength
+from .case import MissingData
 from .style import column, ink, lines, page, panel, plt
 
 kPa = 1e3
@@ -17,16 +18,41 @@ def by_stress(cases):
     return [(s, list(own)) for s, own in groupby(cases, key=lambda c: c.normal_stress)]
 
 
+def is_loop(cases):
+    return any(shearing.is_loop(shearing.of(c)) for c in cases)
+
+
 def on_common_strain(cases, name, step=0.0025):
-    """Strains every `step` that all cases have reached, and a row of `name`, smoothed over a strain of 0.01, for each case."""
-    rows = [c.stage("shear").series for c in cases]
-    strain = np.arange(0, min(r["shear_strain"][-1] for r in rows) + 1e-9, step)
-    values = []
-    for r in rows:
-        mean = strength.smoothed(r["shear_strain"], r[name], 0.01)
-        known = np.isfinite(mean)
-        values.append(np.interp(strain, np.r_[0, r["shear_strain"][known]], np.r_[r[name][0], mean[known]]))
-    return strain, np.array(values)
+    """Strains every `step` that all cases have reached, and a row of `name`, smoothed over a strain of 0.01, for each case. Of stages
+    of shear that follow each other one after the other, with their signs."""
+    drawn = [shearing.drawn(shearing.of(c)) for c in cases]
+    if len({tuple(shearing.direction(rows["shear_strain"]) for rows in stages) for stages in drawn}) > 1:
+        raise MissingData(f"{cases[0].directory} and others at {cases[0].normal_stress / kPa:g} kPa differ in number or direction of "
+                          "their stages of shear, so there is no mean over them")
+    strains, values = [], []
+    for stages in zip(*drawn):
+        d, begin = shearing.direction(stages[0]["shear_strain"]), np.mean([rows["shear_strain"][0] for rows in stages])
+        stages = [shearing.turned(rows) for rows in stages]
+        strain = np.arange(0, min(rows["shear_strain"][-1] for rows in stages) + 1e-9, step)
+        means = []
+        for rows in stages:
+            mean = strength.smoothed(rows["shear_strain"], rows[name], 0.01)
+            known = np.isfinite(mean)
+            means.append(np.interp(strain, np.r_[0, rows["shear_strain"][known]], np.r_[rows[name][0], mean[known]]))
+        strains.append(begin + d * strain)
+        values.append((d if name in shearing.signed else 1) * np.array(means))
+    return np.concatenate(strains), np.concatenate(values, axis=1)
+
+
+def from_zero(axes, loop, x=True, y=True):
+    """Limits of curves that begin at zero and stay above it; of a loop, its axes."""
+    if loop:
+        axes.axhline(0, color="0.6", lw=0.5, zorder=0), axes.axvline(0, color="0.6", lw=0.5, zorder=0)
+        return
+    if x:
+        axes.set_xlim(0)
+    if y:
+        axes.set_ylim(0)
 
 
 def friction_dilation(cases):
@@ -41,11 +67,11 @@ def friction_dilation(cases):
             if len(own) > 1:
                 axes.fill_between(strain, values.min(axis=0), values.max(axis=0), color=look["color"], alpha=0.18, lw=0)
     over.set_ylabel("shear friction $\\tau/\\sigma'$")
-    over.set_ylim(0)
+    from_zero(over, is_loop(cases), x=False)
     over.legend(title="$\\sigma_0$", ncol=2, loc="lower right")
     under.set_ylabel("dilation (mean grain diameters)")
     under.set_xlabel("shear strain $\\gamma$")
-    under.set_xlim(0)
+    from_zero(under, is_loop(cases), y=False)
     figure.align_ylabels()
     panel(over, "a"), panel(under, "b")
     return figure
@@ -84,7 +110,7 @@ def mohr_coulomb(rows):
 def against_height(axes, groups, curve, label, markevery):
     """curve(snapshots) of the sheared beds of each normal stress, as values and heights (m); `label` names the values."""
     for (sigma_0, own), look in zip(groups, lines(len(groups))):
-        values, height = curve([c.stage("shear").snapshots[-1] for c in own])
+        values, height = curve([shearing.of(c).snapshots[-1] for c in own])
         axes.plot(values, height, label=f"{sigma_0 / kPa:g} kPa", markevery=markevery, ms=2.6, mew=0.6, mfc="white", **look)
     axes.set_xlabel(label)
     axes.set_ylabel("height above the floor (m)")
@@ -92,18 +118,18 @@ def against_height(axes, groups, curve, label, markevery):
 
 
 def mean_displacement(snapshots):
-    """Displacement along x (m) and heights (m), means over several beds."""
+    """Displacement along the shear (m) and heights (m), means over several beds."""
     profiles = [profile.displacement(s) for s in snapshots]
     height = np.linspace(max(z[0] for z, _ in profiles), min(z[-1] for z, _ in profiles), 60)
     return np.mean([np.interp(height, z, u) for z, u in profiles], axis=0), height
 
 
 def displacement(cases):
-    """Fig. 8: mean displacement along x against height at each normal stress, over the grains of the lowest stress."""
+    """Fig. 8: mean displacement along the shear against height at each normal stress, over the grains of the lowest stress."""
     figure, axes = plt.subplots(figsize=(column, 3.2))
     groups = by_stress(cases)
     sigma_0, own = groups[0]
-    grains = own[0].stage("shear").snapshots[-1].grains
+    grains = shearing.of(own[0]).snapshots[-1].grains
     axes.plot(grains["displacement"][:, 0], grains["position"][:, 2], ".", color="0.72", ms=1.4, mew=0, rasterized=True,
               label=f"grains, {sigma_0 / kPa:g} kPa")
     against_height(axes, groups, mean_displacement, "displacement along the shear direction (m)", 6)
@@ -159,7 +185,7 @@ def laboratory(cases):
         axes.plot(strain, scale * values.mean(axis=0), color="C0", label="Moraine")
         if len(cases) > 1:
             axes.fill_between(strain, scale * values.min(axis=0), scale * values.max(axis=0), color="C0", alpha=0.2, lw=0)
-    end = strain[-1]
+    end = strain.max()
     for k, ((name, (phi_p, C_p, phi_u, C_u)), mark) in enumerate(zip(paper.materials.items(), "s^oD")):
         at = end * (1.05 + 0.05 * k)
         for phi, C, face in ((phi_p, C_p, "0.35"), (phi_u, C_u, "white")):
@@ -168,12 +194,12 @@ def laboratory(cases):
         if name in paper.dilation:
             under.plot(at, paper.dilation[name], mark, mfc="0.35", mec="0.35", ms=4, label=name)
     over.set_ylabel(f"shear stress at $\\sigma_0$ = {sigma_0 / kPa:g} kPa (kPa)")
-    over.set_ylim(0)
+    from_zero(over, is_loop(cases), x=False)
     over.set_title("filled: peak, open: ultimate (Table 2)", loc="right", fontsize=7, color="0.35")
     under.axhline(0, color="0.6", lw=0.5)
     under.set_ylabel("dilation (mean grain diameters)")
     under.set_xlabel("shear strain $\\gamma$")
-    under.set_xlim(0, end * 1.25)
+    under.set_xlim(min(0, 1.05 * strain.min()), end * 1.25)
     under.set_title("total at 80 kPa (par. 52); the till contracts", loc="right", fontsize=7, color="0.35")
     handles, labels = over.get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower center", bbox_to_anchor=(0.5, -0.09), ncol=3)

@@ -1,10 +1,11 @@
 """The paper's figures, by name, and the command that draws them: ./moraine figures CASE..."""
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Callable
 import sys
 
-from . import bed_figures, force_figures, measure, style, water_figures
+from . import bed_figures, force_figures, measure, shearing, style, water_figures
 from .case import Case, MissingData
 
 
@@ -23,13 +24,13 @@ class Selection:
         """All with the normal stress of the one."""
         return [c for c in self.cases if c.normal_stress == self.one.normal_stress]
 
-    @property
+    @cached_property
     def shear(self):
-        return self.one.stage("shear") if any(s.kind == "shear" for s in self.one.stages) else self.one.stage("shear_stress")
+        return shearing.of(self.one)
 
     @property
     def consolidated(self):
-        return self.one.stage("consolidate").snapshots[-1]
+        return shearing.mirrored(self.one.stage("consolidate").snapshots[-1], self.shear.direction)
 
     @property
     def sheared(self):
@@ -66,7 +67,7 @@ class Figure:
 
 all_figures = (
     Figure("fig04-friction-dilation", "Shear friction and dilation against shear strain (the paper's Fig. 4). Lines: mean over the "
-           "seeds, smoothed over a strain of 0.01; bands: from the least to the largest.",
+           "seeds, smoothed over a strain of 0.01; bands: from the least to the largest. Stages of shear that follow each other are drawn with their signs.",
            lambda s: bed_figures.friction_dilation(s.cases)),
     Figure("fig05-pressure", "Pressure on each grain, the sum of its normal contact forces over its surface, in units of the normal "
            "stress (Fig. 5).", lambda s: force_figures.pressure_3d(s.sheared, s.one.normal_stress)),

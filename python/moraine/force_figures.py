@@ -11,7 +11,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
 
-from . import forces, spheres
+from . import forces, shearing, spheres
 from . import section as sections
 from .case import MissingData
 from .style import column, ink, lines, page, panel, plt, sequential
@@ -284,12 +284,14 @@ def section_key(axes, metre_per_inch, diameter, speed, slip, turn, length):
 
 
 def sheared_bed(case):
-    """The bed at the end of the last shear stage by displacement, displacement over height, friction and dilation over strain."""
+    """The bed at the end of the last shear stage by displacement, displacement over height, friction and dilation over strain.
+
+    Displacement is that of the stage, along its direction. Strain and friction: see shearing.drawn."""
     sheared = [s for s in case.stages if s.sheared]
     if not sheared:
         raise MissingData(f"{case.output}/case.toml: there is no stage that shears")
-    stage = sheared[-1]
-    series, grains = stage.series, stage.snapshots[-1].grains
+    stage = shearing.along(sheared[-1])
+    series, grains, loop = shearing.joined(shearing.drawn(stage)), stage.snapshots[-1].grains, shearing.is_loop(stage)
     x, r, moved = grains["position"], grains["radius"], grains["displacement"][:, 0]
     colour = spheres.colours(moved / (moved.max() or 1.0))
 
@@ -309,14 +311,18 @@ def sheared_bed(case):
 
     profile = figure.add_subplot(grid[:, 1])
     profile.scatter(100 * moved, 100 * x[:, 2], c=colour, s=min(5, 5e3 / len(x)), linewidths=0, rasterized=True)
-    profile.set(xlabel="displacement\nalong x (cm)", ylabel="height (cm)", ylim=0)
+    profile.set(xlabel="displacement\nalong shear (cm)", ylabel="height (cm)", ylim=0)
 
     over = figure.add_subplot(grid[0, 2])
     over.plot(series["shear_strain"], series["shear_friction"], color=ink, lw=0.7)
-    over.set(ylabel="shear friction\n$\\tau/\\sigma'$", ylim=0)
+    over.set(ylabel="shear friction\n$\\tau/\\sigma'$")
     over.tick_params(labelbottom=False)
     under = figure.add_subplot(grid[1, 2], sharex=over)
     under.plot(series["shear_strain"], series["dilation_diameters"], color=ink, lw=0.7)
-    under.set(ylabel="dilation\n(diameters)", xlabel="shear strain", xlim=(0, series["shear_strain"].max() or None))
+    under.set(ylabel="dilation\n(diameters)", xlabel="shear strain")
+    if loop:
+        over.axhline(0, color="0.6", lw=0.5, zorder=0)
+    else:
+        over.set_ylim(0), under.set_xlim(0, series["shear_strain"].max() or None)
     figure.align_ylabels([over, under])
     return figure

@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 
-from . import compaction, forces, profile, rotation, section, strength
+from . import compaction, forces, profile, rotation, section, shearing, strength
 from .case import Case, MissingData
 from .progress import duration
 
@@ -34,8 +34,9 @@ def hours(case):
 
 def strengths(case, until=None):
     """Of the shear stage, up to a strain of `until`: a flat dictionary in the units of its names."""
-    shear = case.stage("shear")
+    shear = shearing.of(case)
     s, rows = strength.strength(shear, until=until), shear.series
+    begin = shearing.course(shear)[0].series
     if until is not None:
         rows = rows.rows(rows["shear_strain"] <= until)
     late = rows["shear_strain"] >= strength.late * s.strain
@@ -45,13 +46,14 @@ def strengths(case, until=None):
         "friction_peak": s.peak, "strain_peak": s.peak_strain,
         "friction_ultimate": s.ultimate, "friction_ultimate_std": s.ultimate_std,
         "dilation_d": s.dilation, "strain_dilated": s.dilation_end, "contraction_d": s.contraction,
-        "height_0_m": rows["height"][0], "porosity_0": rows["porosity"][0], "coordination_0": rows["coordination"][0],
+        "height_0_m": shearing.height_0(rows), "porosity_0": shearing.porosity_0(rows), "coordination_0": begin["coordination"][0],
         "coordination": rows["coordination"][late].mean(),
     }
 
 
 def tilt(tensor):
-    """Angle from the vertical of the axis of its largest principal value, degrees; positive where it dips towards +x."""
+    """Angle from the vertical of the axis of its largest principal value, degrees; positive where it dips towards +x: of a stage seen along
+    its shear (shearing.py), towards the shear."""
     trend, plunge = forces.maximum_compressive_direction(tensor)
     return np.copysign(90 - plunge, np.cos(np.radians(trend)))
 
@@ -63,7 +65,7 @@ def strong_tilt(snapshot):
 
 
 def about(case, shear, consolidate):
-    rate = shear.settings["strain_rate"] or shear.settings["velocity"] / shear.series["height"][0]
+    rate = abs(shear.settings["strain_rate"] or shear.settings["velocity"] / shearing.height_0(shear.series))
     return {"preset": case.settings["model"]["preset"], "f": shear.settings["f"],
             "k_n": case.settings["contact"]["k_n"] / case.settings["model"]["softening"],
             "grains": len(shear.snapshots[-1].grains), "hours": hours(case), "program": case.text.partition("\n")[0].lstrip("# "),
@@ -104,7 +106,7 @@ def rotations(case, shear, consolidate):
 
 def force_chains(case, shear, consolidate):
     """Means over the snapshots of the last third of the shear, since chains come and go."""
-    sigma_0, before = shear.settings["normal_stress"], consolidate.snapshots[-1]
+    sigma_0, before = shear.settings["normal_stress"], shearing.mirrored(consolidate.snapshots[-1], shear.direction)
     late = shear.snapshots[len(shear.snapshots) * 2 // 3:]
     rows = shear.series
     friction = rows["shear_friction"][rows["shear_strain"] >= strength.late * rows["shear_strain"][-1]].mean()
@@ -117,9 +119,9 @@ def force_chains(case, shear, consolidate):
 
 def require_end(case):
     """Raises MissingData where the shear has not come to its end: its ultimate state would be that of the strain it has."""
-    shear = case.stage("shear")
+    shear = shearing.of(case)
     rows = shear.series
-    share = rows["stage_time"][-1] / duration(shear, rows["height"][0])
+    share = rows["stage_time"][-1] / duration(shear, shearing.height_0(rows))
     if share < 0.999:
         raise MissingData(f"{case.directory}: the shear has come to {100 * share:.0f} % of its time; it is still running, or was cut off")
 
@@ -130,7 +132,7 @@ def measure(case, say=print):
     out = strengths(case)
     for part in (about, consolidation, profiles, rotations, force_chains):
         try:
-            out |= part(case, case.stage("shear"), case.stage("consolidate"))
+            out |= part(case, shearing.of(case), case.stage("consolidate"))
         except MissingData as why:
             say(f"{part.__name__.replace('_', ' ')}: not measured: {why}")
     return out

@@ -5,14 +5,14 @@ import time
 
 import numpy as np
 
-from . import case as cases, sealed
+from . import case as cases, sealed, shearing
 from .case import MissingData
 
 window = 300  # s of the clock over which the pace of a run is measured
 
 
 def duration(stage, height):
-    """Of a stage, s of model time; `height` of the bed when it begins, m. As describe() in src/run/stages.cpp."""
+    """Of a stage, s of model time; `height`: H_0 of the bed, that when shear began, m. As describe() in src/run/stages.cpp."""
     s = stage.settings
     if s["duration"] > 0:
         return s["duration"]
@@ -98,7 +98,7 @@ class Progress:
 
     @property
     def height_0(self):
-        """Of the bed when the stage began, m."""
+        """Of the bed when the stage, or the course of shear that it goes on with, began, m."""
         return self.last("height") - self.last("dilation")
 
     @property
@@ -112,7 +112,9 @@ class Progress:
     @property
     def strain(self):
         """In the direction that ends the stage: of shear, or axial."""
-        return abs(self.last("dilation")) / self.height_0 if self.stage.kind == "uniaxial" else abs(self.last("shear_strain"))
+        if self.stage.kind == "uniaxial":
+            return abs(self.last("dilation")) / self.height_0
+        return float(shearing.along(self.stage).series["shear_strain"][-1])
 
     def _pace(self, what):
         """Model time (1) or rows (2) for a second of the clock; 0 if not known yet."""
@@ -126,11 +128,13 @@ class Progress:
             return None
         since = time.time() - self._seen[-1][0]
         stage = max(0.0, (self.duration - self.last("stage_time")) / rate - since)
-        later = 0.0
+        later, goes_on = 0.0, self.stage.sheared
         for other in self.case.stages[self.stage.index + 1:]:
+            goes_on = goes_on and other.sheared
+            height = self.height_0 if goes_on else self.last("height")
             # The time step of a stage, hence how fast it advances, goes with its f, unless the case gives dt.
             faster = 1 if self.case.settings["model"]["dt"] else other.settings["f"] / self.stage.settings["f"]
-            later += duration(other, self.last("height")) / (rate * faster)
+            later += duration(other, height) / (rate * faster)
         return stage, stage + later
 
     def residue(self):

@@ -15,7 +15,7 @@ import subprocess
 import numpy as np
 from scipy import special, stats
 
-from . import figures, measure, paper
+from . import figures, measure, paper, shearing
 from .case import MissingData
 
 
@@ -228,7 +228,7 @@ def variant(main_cases, name, cases):
     pairs = [(main[key(c)], c) for c in cases if key(c) in main]
     if not pairs:
         return None
-    end = min(c.stage("shear").series["shear_strain"][-1] for pair in pairs for c in pair)
+    end = min(shearing.of(c).series["shear_strain"][-1] for pair in pairs for c in pair)
     both = [[measure.strengths(c, until=end * (1 + 1e-9)) for c in pair] for pair in pairs]
     values = {}
     for column in compared:

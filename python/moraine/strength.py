@@ -1,6 +1,7 @@
 """Shear strength: peak and ultimate values of a sheared stage, and the Mohr-Coulomb line through several (eq. 2).
 
-Definitions. Shear friction is tau/sigma', both as measured at the same instant. Two ways to read a peak off it:
+Definitions. All is read along the direction of the stage (shearing.py), over its own strain; dilation is that since shear began.
+Shear friction is tau/sigma', both as measured at the same instant. Two ways to read a peak off it:
   raw       the largest value of a series with a row every 0.05 s (a strain of 0.0025), as the paper's was. Such a series is
             noisy, so this is the peak of the strength plus a few standard deviations of the noise
   smoothed  the largest mean over a shear strain of 0.02
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize, stats
 
-from . import paper
+from . import paper, shearing
 from .case import MissingData
 
 window = 0.02       # of shear strain, over which the smoothed peak is a mean
@@ -28,21 +29,25 @@ class Strength:
     ultimate_std: float     # of the rows in the last third
     dilation: float         # mean grain diameters, mean over the last tenth of the strain
     dilation_end: float     # strain at which 95 % of that is reached, smoothed
-    contraction: float      # deepest point below the start, diameters
+    contraction: float      # deepest point below H_0, diameters
     strain: float           # at the end
     tau_peak_raw: float     # largest shear stress of the same rows as peak_raw, Pa
 
 
 def smoothed(strain, values, width=window):
-    """Means of the rows within width/2 of each; nan where the window reaches beyond the data. Rows in order of strain."""
+    """Means of the rows within width/2 of each; nan where the window reaches beyond the data."""
     strain, values = np.asarray(strain, float), np.asarray(values, float)
+    order = np.argsort(strain, kind="stable")  # shear may go along -x, and a layer that a stress drives to and fro
+    strain, values = strain[order], values[order]
     total = np.concatenate([[0], np.cumsum(values)])
     half = width / 2 * (1 + 1e-9)
     first = np.searchsorted(strain, strain - half, side="left")
     last = np.searchsorted(strain, strain + half, side="right")
     mean = (total[last] - total[first]) / (last - first)
     mean[(strain - half < strain[0] - half * 1e-6) | (strain + half > strain[-1] + half * 1e-6)] = np.nan
-    return mean
+    as_given = np.empty_like(mean)
+    as_given[order] = mean
+    return as_given
 
 
 def every(times, interval):
@@ -53,7 +58,7 @@ def every(times, interval):
 
 def strength(stage, sampling=paper.sampling, until=None):
     """Of a sheared stage. `sampling`: seconds between the rows that the raw peak is read from; `until`: strain to stop at."""
-    rows = stage.series
+    rows = shearing.along(stage).series
     if until is not None:
         rows = rows.rows(rows["shear_strain"] <= until)
     strain, friction, dilation = rows["shear_strain"], rows["shear_friction"], rows["dilation_diameters"]
@@ -66,8 +71,9 @@ def strength(stage, sampling=paper.sampling, until=None):
     best = int(np.nanargmax(mean)) if np.isfinite(mean).any() else top
     ultimate = friction[strain >= late * strain[-1]]
     final = dilation[strain >= 0.9 * strain[-1]].mean()
-    swell = smoothed(strain, dilation)
-    reached = np.flatnonzero(swell >= 0.95 * final)
+    change = final - dilation[0]  # of the stage: a later one begins with what earlier ones have left
+    swell = np.sign(change) * (smoothed(strain, dilation) - dilation[0])
+    reached = np.flatnonzero(swell >= 0.95 * np.abs(change))
     return Strength(friction[top], strain[top], mean[best] if np.isfinite(mean[best]) else friction[top], strain[best],
                     ultimate.mean(), ultimate.std(), final, strain[reached[0]] if len(reached) else np.nan,
                     dilation.min(), strain[-1], rows["shear_stress"][raw].max())

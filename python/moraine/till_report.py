@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import measure, style, water_figures
+from . import measure, shearing, style, water_figures
 from .case import Case, MissingData
 from .progress import duration
 from .strength import smoothed
@@ -25,11 +25,11 @@ class Run:
 
     def __init__(self, name, case):
         self.name, self.case = name, case
-        self.stage = case.stage("shear")
+        self.stage = shearing.along(case.stage("shear"))
         self.rows = self.stage.series
         self.wet = self.stage.wet
-        self.rate = self.stage.settings["strain_rate"]
-        if self.rate <= 0:
+        self.rate = abs(self.stage.settings["strain_rate"])
+        if self.rate == 0:
             raise MissingData(f"{case.output}/case.toml: the stage {self.stage.name} has no strain_rate")
         water = case.settings.get("fluid", {})
         self.viscosity, self.k_c = (water["viscosity"], water["permeability_factor"]) if self.wet else (0.0, np.inf)
@@ -40,7 +40,7 @@ class Run:
     @property
     def done(self):
         """Share of the stage that has been computed."""
-        return min(1.0, self.rows["stage_time"][-1] / duration(self.stage, self.rows["height"][0]))
+        return min(1.0, self.rows["stage_time"][-1] / duration(self.stage, shearing.height_0(self.rows)))
 
     @property
     def finished(self):
@@ -56,7 +56,7 @@ class Run:
         even out through the bed, over that in which dilation at the rate of shear would lower it by sigma_0."""
         if not self.wet:
             return 0.0
-        phi, height = self.rows["porosity"][0], self.rows["height"][0]
+        phi, height = shearing.porosity_0(self.rows), shearing.height_0(self.rows)
         return self.viscosity * self.rate * height**2 / (self.k_c * phi**3 / (1 - phi)**2 * self.sigma_0)
 
     @cached_property
@@ -81,7 +81,7 @@ class Run:
 
     @property
     def peak_raw(self):
-        return self.friction[1:].max()
+        return self.friction[self.rows["shear_strain"] > 0].max()
 
     def _mean_of_end(self, values):
         strain = self.rows["shear_strain"]
@@ -99,8 +99,8 @@ class Run:
             "strain": self.rows["shear_strain"][-1], "peak": self.peak, "strain_at_peak": self.strain_at_peak, "peak_raw": self.peak_raw,
             "friction_end": self._mean_of_end(self.friction), "grain_friction_end": self._mean_of_end(self.rows["shear_friction"]),
             "lowest_pressure_kPa": self.lowest_pressure / 1e3 if self.wet else "",
-            "dilation_d": self._mean_of_end(self.rows["dilation_diameters"]), "porosity_0": self.rows["porosity"][0],
-            "height_0_m": self.rows["height"][0],
+            "dilation_d": self._mean_of_end(self.rows["dilation_diameters"]), "porosity_0": shearing.porosity_0(self.rows),
+            "height_0_m": shearing.height_0(self.rows),
         }
 
 

@@ -9,6 +9,7 @@ import sys
 import textwrap
 import time
 
+from . import shearing
 from .case import MissingData
 from .progress import Progress, readable
 from .textplot import plot
@@ -42,12 +43,16 @@ def panels(kind):
 
 
 def curves(progress, by_time):
-    """The rows to draw, and name and values of x. A stage driven by stress may stand still, so its strain is no axis."""
+    """The rows to draw, and name and values of x; of shear in the direction that shearing.py says. A stage driven by stress may stand
+    still, so its strain is no axis."""
+    stage, series = progress.stage, shearing.drawn_series(progress.series, progress.case.stages)
     if by_time:
-        return progress.series, "time, s", progress.series["time"]
-    if progress.stage.kind == "shear":
-        return progress.own, "shear strain", progress.own["shear_strain"]
-    return progress.own, "stage time, s", progress.own["stage_time"]
+        return series, "time, s", series["time"]
+    if stage.kind == "shear":
+        rows = shearing.joined(shearing.drawn(stage))
+        return rows, "shear strain", rows["shear_strain"]
+    own = series.rows(series["stage"] == stage.index)
+    return own, "stage time, s", own["stage_time"]
 
 
 def title(progress):
@@ -72,7 +77,8 @@ def status(progress, state):
     energy = f"residue {joules:.1e} J, {relative:.0e} of the energy put in" if math.isfinite(joules) else "no energy ledger"
     numbers = [f"dilation {last('dilation_diameters'):+.3f} diameters", f"porosity {last('porosity'):.3f}", energy]
     if stage.sheared:
-        numbers.insert(0, f"friction {last('shear_friction'):.3f}, peak {progress.own['shear_friction'].max():.3f}")
+        friction = shearing.along(stage).series["shear_friction"]
+        numbers.insert(0, f"friction {friction[-1]:.3f}, peak {friction.max():.3f}")
     again = f"./moraine run {progress.directory} --resume"
     if state == "stopped":
         return [where, clock, numbers, [progress.why_stopped], [f"To go on: {again}"]]

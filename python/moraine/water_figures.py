@@ -4,7 +4,7 @@ Pressures are those over hydrostatic. Curves are smoothed over a shear strain of
 water together press on the top wall; in a dry bed that is the shear friction."""
 import numpy as np
 
-from . import strength
+from . import shearing, strength
 from .case import MissingData
 from .style import lines, page, panel, plt
 
@@ -26,6 +26,11 @@ def curve(rows, values):
     return np.r_[strain[0], strain[known]], np.r_[values[0], mean[known]]
 
 
+def course_curve(stage, pick):
+    """The same of a stage and those that it is drawn with (shearing.drawn); pick(rows) gives the values."""
+    return (np.concatenate(parts) for parts in zip(*(curve(rows, pick(rows)) for rows in shearing.drawn(stage))))
+
+
 def unit_of(pressures):
     """Name and size of the unit that suits these pressures (Pa)."""
     largest = np.max(np.abs(pressures), initial=0.0)
@@ -40,34 +45,36 @@ def shear(stages, labels):
     """Stages beside each other, such as a wet one and its dry twin: total friction, friction of the grains, pressure, dilation."""
     figure, axes = plt.subplots(2, 2, figsize=(page, 4.4), sharex=True, gridspec_kw={"hspace": 0.2, "wspace": 0.26})
     (total, grains), (pressure, dilation) = axes
-    series = [s.series for s in stages]
-    wet = [r for s, r in zip(stages, series) if s.wet]
+    loop = any(shearing.is_loop(s) for s in stages)
+    wet = [rows for s in stages if s.wet for rows in shearing.drawn(s)]
     unit, size = unit_of(np.concatenate([r["water_pressure_mean"] for r in wet]) if wet else [0.0])
     highest = 0.0
-    for stage, rows, label, colour in zip(stages, series, labels, plt.rcParams["axes.prop_cycle"].by_key()["color"]):
+    for stage, label, colour in zip(stages, labels, plt.rcParams["axes.prop_cycle"].by_key()["color"]):
         look = {"color": colour, "linestyle": "-" if stage.wet else "--", "label": label or None}
-        strain, friction = curve(rows, total_friction(rows, stage.wet))
+        strain, friction = course_curve(stage, lambda rows: total_friction(rows, stage.wet))
         highest = max(highest, friction.max())
         total.plot(strain, friction, **look)
-        grains.plot(*curve(rows, rows["shear_friction"]), **look)
-        dilation.plot(*curve(rows, rows["dilation_diameters"]), **look)
+        grains.plot(*course_curve(stage, lambda rows: rows["shear_friction"]), **look)
+        dilation.plot(*course_curve(stage, lambda rows: rows["dilation_diameters"]), **look)
         if stage.wet:
-            strain, mean = curve(rows, rows["water_pressure_mean"] / size)
-            pressure.plot(strain, mean, **look)
-    if highest > 5:
+            pressure.plot(*course_curve(stage, lambda rows: rows["water_pressure_mean"] / size), **look)
+    if loop:
+        for ax in (total, grains):
+            ax.axhline(0, color="0.6", lw=0.5, zorder=0)
+    elif highest > 5:
         total.set_yscale("log")
         total.set_ylim(0.1)
     else:
         total.set_ylim(0)
     total.set_ylabel("total friction $\\tau/\\sigma$")
     grains.set_ylabel("friction of the grains $\\tau/\\sigma'$")
-    grains.set_ylim(0)
+    if not loop:
+        grains.set_ylim(0), total.set_xlim(0)
     pressure.set_ylabel(pressure_label(unit))
     dilation.set_ylabel("dilation (diameters)")
     for ax in (pressure, dilation):
         ax.axhline(0, color="0.6", lw=0.5, zorder=0)
         ax.set_xlabel("shear strain $\\gamma$")
-    total.set_xlim(0)
     if any(labels):
         total.legend(loc="best")
     figure.align_ylabels()
@@ -111,7 +118,7 @@ def pressure(stage):
     field.set_xlabel("time since the stage began (s)")
     field.set_ylabel("depth below the top wall (m)")
     field.set_ylim(heights.max(), 0)
-    rows = stage.series
+    rows = shearing.along(stage).series
     if stage.kind == "shear" and rows["stage_time"][-1] > 0:  # at an even rate
         rate = rows["shear_strain"][-1] / rows["stage_time"][-1]
         if rate > 0:

@@ -1,11 +1,14 @@
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <iostream>
+#include <limits>
+#include <string>
 
 #include "case/keys.hpp"
 #include "dem/spectrum.hpp"
+#include "error.hpp"
+#include "run/estimate.hpp"
 #include "run/needs.hpp"
 #include "run/precheck.hpp"
 #include "run/progress.hpp"
@@ -16,22 +19,6 @@
 namespace moraine::run {
 
 namespace {
-
-// ms a step, from a few steps of the stage itself.
-double time_a_step(dem::Engine& engine, const dem::Scene& scene, const dem::State& state,
-                   dem::Surroundings* water) {
-  engine.load(scene, state, water);
-  engine.advance(20);
-  const auto began = std::chrono::steady_clock::now();
-  std::int64_t steps = 0;
-  double seconds = 0;
-  while (seconds < 0.5) {
-    engine.advance(20);
-    steps += 20;
-    seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
-  }
-  return 1e3 * seconds / static_cast<double>(steps);
-}
 
 // Stiffness of the skeleton against uniaxial compression, Pa: contacts as linear springs, all of one length,
 // that follow the mean strain (M = K + 4/3 G; a real packing gives way to a half of that or less).
@@ -108,27 +95,30 @@ void check_case(const Options& options) {
                 c.preset.c_str(), f.c_str(), c.softening, c.k_n);
   }
 
-  double total = 0, ms = 0;
+  std::printf("  backend       %s\n", engine->describe().c_str());
+  Estimate estimate(c, start, *engine);
+  double total = 0;
+  bool complete = true;
   for (std::size_t k = 0; k < c.stages.size(); ++k) {
     const cases::Stage& wanted = c.stages[k];
     output::Checkpoint now = start.before;
     Stage stage = prepare(c, k, start, now);
     const dem::State& s = now.state;
     const dem::Scene& scene = stage.scene;
-    if (k == 0) {
-      dem::Scene timed = scene;  // with a step that the bed survives: how long one takes is the same
-      timed.dt = std::min(scene.dt, 0.5 * critical_step(scene, s));
-      auto timed_water = fill(stage, s, now.water, stage.goes_on);
-      timed.exchange_interval = stage.scene.exchange_interval;
-      ms = time_a_step(*engine, timed, s, timed_water.get());
-      std::printf("  backend       %s\n", engine->describe().c_str());
-    }
     // Before the bed has settled its height is not known: from the volume of the grains.
     const double height = c.start.empty() ? settled : stage.height_0;
     double strain_rate = wanted.strain_rate != 0 ? wanted.strain_rate : scene.shear.velocity / height;
     const double duration = wanted.duration > 0 ? wanted.duration : wanted.strain / std::abs(strain_rate);
     const double steps = std::max(1.0, std::round(duration / scene.dt));
-    total += steps * ms / 1e3;
+    Estimate::Time time{steps, std::numeric_limits<double>::quiet_NaN()};
+    std::string unknown;
+    try {
+      time = estimate.stage(k, duration);
+      total += time.seconds;
+    } catch (const Error& why) {  // of a bed that was made up, which the run may never meet
+      unknown = why.what();
+      complete = false;
+    }
     const double critical = step_by_eq_9(scene, s, 2.0);  // 2/omega_0, par. 23
     std::printf("  stage %zu: %s\n", k + 1, wanted.name.c_str());
     std::printf("    step        %.4g s, %.3g of the two-body limit 2/omega_0; %.0f steps for %.4g s\n",
@@ -156,9 +146,14 @@ void check_case(const Options& options) {
     if (const auto water = fill(stage, s, now.water, stage.goes_on))
       print_water(c, stage, s, *water, wanted.kind == cases::Stage::Kind::settle ? settled : stage.height_0,
                   strain_rate);
-    std::printf("    time        about %s at %.3g ms a step\n", readable_time(steps * ms / 1e3).c_str(), ms);
+    if (unknown.empty())
+      std::printf("    time        about %s at %.3g ms a step\n", readable_time(time.seconds).c_str(),
+                  time.ms());
+    else
+      std::printf("    time        not known: %s\n", unknown.c_str());
   }
-  std::printf("  all           about %s, timed on the first stage's grains\n", readable_time(total).c_str());
+  std::printf("  all           about %s, timed on beds like those to come%s\n", readable_time(total).c_str(),
+              complete ? "" : "; without stages whose time is not known");
   for (const std::string& w : warnings) std::printf("  warning: %s\n", w.c_str());
 }
 

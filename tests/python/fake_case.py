@@ -67,7 +67,8 @@ class FakeCase:
         return self.output / "series.h5"
 
     def history(self, interval=0.01, dt=1e-4, height=0.32):
-        """All rows of all stages: friction with a peak of about 0.5 at a strain of 0.05, dilation, energies that decay."""
+        """All rows of all stages: friction with a peak of about 0.5 at a strain of 0.05, dilation, energies that decay. Stages of shear
+        that follow each other go on from each other's strain, friction and dilation."""
         parts, began = [], 0.0
         for index, s in enumerate(self.stages):
             rate = s["strain_rate"] or s["velocity"] / height
@@ -78,9 +79,13 @@ class FakeCase:
             rows["porosity"], rows["coordination"], rows["unbalanced_force"] = 0.42, 4.0, 0.05 + np.exp(-t / 0.05)
             rows["kinetic"], rows["potential"] = 0.02 + 10 * np.exp(-t / 0.05), 100 - np.minimum(t, 1)
             if s["kind"] in ("shear", "shear_stress"):
-                rows["shear_strain"] = strain = rate * t
-                rows["shear_friction"] = 0.4 * (1 - np.exp(-strain / 0.005)) + 0.1 * strain / 0.05 * np.exp(1 - strain / 0.05)
-                rows["dilation_diameters"] = 0.4 * (1 - np.exp(-strain / 0.2))
+                strain, d = abs(rate) * t, np.sign(rate)
+                goes_on = index > 0 and self.stages[index - 1]["kind"] in ("shear", "shear_stress")
+                before = parts[-1][-1] if goes_on else np.zeros((), row_type)
+                friction = 0.4 * (1 - np.exp(-strain / 0.005)) + 0.1 * strain / 0.05 * np.exp(1 - strain / 0.05)
+                rows["shear_strain"] = before["shear_strain"] + d * strain
+                rows["shear_friction"] = before["shear_friction"] * np.exp(-strain / 0.005) + d * friction
+                rows["dilation_diameters"] = before["dilation_diameters"] + (-0.1 if goes_on else 0.4) * (1 - np.exp(-strain / 0.2))
                 rows["layers_work"] = 100 * strain
             if s["kind"] == "uniaxial":
                 rows["dilation_diameters"] = -rate * t * height / 0.04

@@ -17,7 +17,7 @@ units = {
 
 
 def write(directory, position, radius=0.5, pairs=(), normal=1.0, tangential=0.0, box=(10, 10, 0), top_wall=np.inf, leave_out=(),
-          **grains):
+          stem="01-shear-000000", time=0.0, **grains):
     """A snapshot of grains at `position`, of which `pairs` (i, j) touch: |f_n| = normal along the branch, f_t = tangential, on i.
 
     grains: role, velocity, spin, pressure, ...; zero where not given. leave_out: names such as "grains/spin"."""
@@ -44,9 +44,9 @@ def write(directory, position, radius=0.5, pairs=(), normal=1.0, tangential=0.0,
                 "point": np.column_stack([point[:, :2] % box[:2], point[:, 2]]), "force_normal": f_n,
                 "force_tangential": f_t, "force": f_n + f_t, "overlap": overlap}
 
-    file = Path(directory) / "01-shear-000000.h5"
+    file = Path(directory) / f"{stem}.h5"
     with h5py.File(file, "w") as h5:
-        h5.attrs.update({"program": "moraine", "name": file.stem, "time": 0.0, "step": 0, "stage_time": 0.0, "box": box,
+        h5.attrs.update({"program": "moraine", "name": file.stem, "time": time, "step": 0, "stage_time": time, "box": box,
                          "top_wall": float(top_wall)})
         for group, data in (("grains", columns), ("contacts", contacts)):
             for name in units[group]:

@@ -13,8 +13,8 @@ def write(directory, wet=True, rate=0.05, k_c=3.5e-9, snapshots=4, rows=None, pe
     snapshots whose pressure is -1000 Pa x the number of the level x that of the snapshot."""
     case = FakeCase(directory, [stage("shear", "shear", strain=0.3, strain_rate=rate, normal_stress=20e3, mu_s=0.3, fluid=wet)],
                     fluid=water | {"enabled": wet, "permeability_factor": k_c})
-    history = case.history(interval=0.001 / rate, height=height)
-    strain = history["shear_strain"]
+    history = case.history(interval=0.001 / abs(rate), height=height)
+    strain = abs(history["shear_strain"])
     history["total_friction"] = peak * history["shear_friction"]
     history["water_pressure_mean"] = -2e3 * strain / 0.05 * np.exp(1 - strain / 0.05)
     case.write(history[:rows])
