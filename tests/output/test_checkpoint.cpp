@@ -217,7 +217,7 @@ TEST_F(CheckpointFile, RefusesAnotherFormat) {
 
   directory.write("checkpoint.h5", hdf5);  // has lost its seal
   EXPECT_THROW(read_checkpoint(path), Damaged);
-  hdf5[25] = 0;  // as formats before 5 were
+  hdf5[25] = 0, hdf5 += "stage_start_time";  // as formats before 5 had it
   directory.write("checkpoint.h5", hdf5);
   EXPECT_TRUE(
       contains(why_not(), path.string() + ": written by an earlier version of moraine (checkpoint format 4"))

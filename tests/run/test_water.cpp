@@ -223,7 +223,7 @@ TEST(SauterDiameter, IsOfVolumeOverSurface) {
 TEST_F(Water, TakesTheSauterMeanForPermeability) {
   const fs::path wet = make("wet", wet_case());
   const Outcome o = moraine({"check", wet.string(), "--threads", "1", "--set", "fluid.permeability_factor=0",
-                             "--set", "grains.radius_std=0.005"});
+                             "--set", "grains.radius_std=0.003"});
   ASSERT_EQ(o.status, 0) << o.err;
   const auto number = [&](const std::string& after) {
     const auto at = o.out.find(after);
