@@ -89,10 +89,10 @@ def run(args):
     home = root / "cases" / args.NAME
     if not (home / "Snakefile").exists():
         raise MissingData(f"there is no {home}/Snakefile; studies: {', '.join(studies()) or 'none (they are in the repository)'}")
+    study = study_of(args)  # first, so that what is wrong with it is said before anything is to be installed
     snakemake = shutil.which("snakemake")
     if not snakemake:
         raise MissingData("snakemake is not installed (Debian: apt-get install snakemake)")
-    study = study_of(args)
     held = [] if args.dry_run else hold(home, study)
     if not args.dry_run:
         study.write_cases(home)

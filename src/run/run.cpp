@@ -314,16 +314,15 @@ class Runner {
 
   void snapshot(const Stage& stage) {
     // By number within the stage; the interval may have changed on the way.
-    char name[80];
-    const int length =
-        std::snprintf(name, sizeof name, "%02d-%s-", static_cast<int>(now_.stage) + 1, stage.name.c_str());
-    const std::string beginning(name, static_cast<std::size_t>(length));
-    const auto number = std::count_if(now_.snapshots.begin(), now_.snapshots.end(),
-                                      [&](const auto& s) { return s.file.starts_with(beginning); });
-    std::snprintf(name, sizeof name, "%s%06lld", beginning.c_str(), static_cast<long long>(number));
+    char place[32], number[32];
+    std::snprintf(place, sizeof place, "%02d-", static_cast<int>(now_.stage) + 1);
+    const std::string name = place + stage.name + "-";
+    const auto count = std::count_if(now_.snapshots.begin(), now_.snapshots.end(),
+                                     [&](const auto& s) { return s.file.starts_with(name); });
+    std::snprintf(number, sizeof number, "%06lld", static_cast<long long>(count));
     now_.snapshots.push_back(
-        output::write_snapshot(files_.snapshots(), name, now_.rows.back().time, stage.scene, now_.state,
-                               water_ ? std::optional(water_->fields()) : std::nullopt, &loads_));
+        output::write_snapshot(files_.snapshots(), name + number, now_.rows.back().time, stage.scene,
+                               now_.state, water_ ? std::optional(water_->fields()) : std::nullopt, &loads_));
     all_listed_ = false;
   }
 
