@@ -11,13 +11,19 @@ class Error : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// Joins its arguments into an Error: `throw error("grain ", i, " left the box at step ", n);`
+// Joins its arguments: numbers with up to nine digits.
+template <class... Parts>
+std::string text(const Parts&... parts) {
+  std::ostringstream joined;
+  joined.precision(9);
+  (joined << ... << parts);
+  return joined.str();
+}
+
+// Into an Error: `throw error("grain ", i, " left the box at step ", n);`
 template <class... Parts>
 Error error(const Parts&... parts) {
-  std::ostringstream text;
-  text.precision(9);
-  (text << ... << parts);
-  return Error(text.str());
+  return Error(text(parts...));
 }
 
 }  // namespace moraine

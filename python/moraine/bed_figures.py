@@ -38,7 +38,9 @@ def on_common_strain(cases, name, step=0.0025):
         for rows in stages:
             mean = strength.smoothed(rows["shear_strain"], rows[name], 0.01)
             known = np.isfinite(mean)
-            means.append(np.interp(strain, np.r_[0, rows["shear_strain"][known]], np.r_[rows[name][0], mean[known]]))
+            at, what = np.r_[0, rows["shear_strain"][known]], np.r_[rows[name][0], mean[known]]
+            order = np.argsort(at, kind="stable")  # a layer that a stress drives may spring back
+            means.append(np.interp(strain, at[order], what[order]))
         strains.append(begin + d * strain)
         values.append((d if name in shearing.signed else 1) * np.array(means))
     return np.concatenate(strains), np.concatenate(values, axis=1)

@@ -13,7 +13,7 @@ import stat
 import h5py
 
 size = 512
-patience = 5  # s, for a file without a seal; a series takes some milliseconds
+patience = 5, 20e6  # s, and more for so many bytes a second, for a file without a seal; a series takes some milliseconds
 
 
 class MissingData(Exception):
@@ -77,8 +77,9 @@ def _read_apart(file, what, how):
     reader.start()
     its.close()
     try:
-        if not ours.poll(patience):
-            raise MissingData(f"{file}: damaged: HDF5 has not read it in {patience} s")
+        seconds = patience[0] + os.stat(file).st_size / patience[1]
+        if not ours.poll(seconds):
+            raise MissingData(f"{file}: HDF5 has not read it in {seconds:.0f} s: damaged, or on a disk that is very slow")
         result, problem = ours.recv()
     except EOFError:
         raise MissingData(f"{file}: damaged: HDF5 dies of reading it") from None

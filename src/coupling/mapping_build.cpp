@@ -84,7 +84,8 @@ double Mapping::clip(const fluid::Grid& grid, const Holds& holds, const Vec3d& x
     if (!holds.high[a]) high[a] = std::clamp((grid.length[a] - x[a]) / r, -1.0, 1.0);
     if (low[a] == -1 && high[a] == 1) continue;
     const double left = low[a] < high[a] ? ball * (ball_in_box(low, high) / unit_ball) : 0;
-    const double below = unit_ball - ball_beyond(low[a]), above = ball_beyond(high[a]);
+    const double below = ball_beyond(-low[a]), above = ball_beyond(high[a]);
+    if (below + above == 0) continue;  // touches the side
     outside_.volume[a][0] += (inside - left) * (below / (below + above));
     outside_.volume[a][1] += (inside - left) * (above / (below + above));
     if (left == 0) ++outside_.grains[a][below > above ? 0 : 1];

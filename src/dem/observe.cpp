@@ -101,23 +101,22 @@ Loads loads_of(const Scene& scene, const State& s) {
           s.shear_force};
 }
 
-Loads mean(const std::vector<Loads>& steps) {
-  Loads sum = steps.front();
-  if (steps.size() == 1) return sum;
-  for (std::size_t k = 1; k < steps.size(); ++k) {
-    const Loads& next = steps[k];
-    merge(
-        sum.contacts, next.contacts, [](const ContactForce& c) { return std::pair(c.i, c.j); },
-        [](ContactForce& to, const ContactForce& c) {
-          to.f_n += c.f_n, to.f_t += c.f_t, to.overlap += c.overlap;
-        });
-    merge(
-        sum.walls, next.walls, [](const WallForce& w) { return std::pair(w.wall, w.i); },
-        [](WallForce& to, const WallForce& w) { to.f_n += w.f_n, to.f += w.f, to.delta_n += w.delta_n; });
-    for (std::size_t i = 0; i < sum.force.size(); ++i) sum.force[i] += next.force[i];
-    sum.wall_force += next.wall_force, sum.shear_force += next.shear_force;
-  }
-  const double share = 1 / static_cast<double>(steps.size());
+void add(Loads& sum, const Loads& next) {
+  merge(
+      sum.contacts, next.contacts, [](const ContactForce& c) { return std::pair(c.i, c.j); },
+      [](ContactForce& to, const ContactForce& c) {
+        to.f_n += c.f_n, to.f_t += c.f_t, to.overlap += c.overlap;
+      });
+  merge(
+      sum.walls, next.walls, [](const WallForce& w) { return std::pair(w.wall, w.i); },
+      [](WallForce& to, const WallForce& w) { to.f_n += w.f_n, to.f += w.f, to.delta_n += w.delta_n; });
+  for (std::size_t i = 0; i < sum.force.size(); ++i) sum.force[i] += next.force[i];
+  sum.wall_force += next.wall_force, sum.shear_force += next.shear_force;
+}
+
+Loads mean(Loads sum, std::int64_t steps) {
+  if (steps == 1) return sum;
+  const double share = 1 / static_cast<double>(steps);
   for (ContactForce& c : sum.contacts) c.f_n = share * c.f_n, c.f_t = share * c.f_t, c.overlap *= share;
   for (WallForce& w : sum.walls) w.f_n *= share, w.f = share * w.f, w.delta_n *= share;
   for (Vec3d& f : sum.force) f = share * f;

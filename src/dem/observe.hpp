@@ -47,7 +47,8 @@ struct Loads {
   double shear_force = 0;              // N, sum of x forces of the grains on the top layer
 };
 Loads loads_of(const Scene& scene, const State& staggered);
-Loads mean(const std::vector<Loads>& steps);  // at least one; a single one keeps its bits
+void add(Loads& sum, const Loads& next);    // of the steps so far
+Loads mean(Loads sum, std::int64_t steps);  // one step keeps its bits
 
 // Forces, overlaps and the number of contacts are those of `loads`, all else that of the state.
 struct Observation {

@@ -423,10 +423,14 @@ void validate(const std::string& file, const Checkpoint& c) {
 
 void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint,
                       const std::filesystem::path& before) {
-  const hdf5::Lock lock;
-  const auto file = hdf5::File::in_memory(path);
-  for_each_member<Checkpoint>([&](const char* name, auto pointer) { put(file, name, checkpoint.*pointer); });
-  write_text(path, file.sealed(kind, format), before);
+  const std::string bytes = [&] {
+    const hdf5::Lock lock;  // but not while the disk writes: other cases have rows to append
+    const auto file = hdf5::File::in_memory(path);
+    for_each_member<Checkpoint>(
+        [&](const char* name, auto pointer) { put(file, name, checkpoint.*pointer); });
+    return file.sealed(kind, format);
+  }();
+  write_text(path, bytes, before);
 }
 
 Checkpoint read_checkpoint(const std::filesystem::path& path) {

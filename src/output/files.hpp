@@ -73,6 +73,18 @@ class Series {
 // Reads series.h5 back, also while another process appends (SWMR). Throws Error.
 std::vector<Row> read_series(const std::filesystem::path& path);
 
+// What a stage began with: rows of the series and snapshots count from here.
+struct StageStart {
+  double time = 0;        // s, since the case began
+  std::int64_t step = 0;  // of the scene's clock; not 0 where the stage goes on as the one before
+  double clock = 0;       // s, Scene::time(step)
+  double end = 0;         // s, of that clock: where the stage is to end, between two steps
+  double energy = 0;      // J
+  dem::Ledger ledger;
+  double drained_top = 0, drained_bottom = 0;  // m3
+  double water_dissipated = 0;                 // J
+};
+
 // snapshots/NAME.h5, grains in the order of their ids, contacts with force vectors; attributes time, stage,
 // step. All datasets carry `units`. NAME comes from stage and number: e.g. 02-shear-000040.h5. loads: the
 // forces to write; null: those of the step alone.
@@ -86,23 +98,11 @@ struct SnapshotInfo {
 SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::string& name, double time,
                             const dem::Scene& scene, const dem::State& staggered,
                             const std::optional<coupling::WaterFields>& water = {},
-                            const dem::Loads* loads = nullptr);
+                            const dem::Loads* loads = nullptr, const StageStart& start = {});
 // snapshots/grains.xdmf and snapshots/contacts.xdmf: time series for ParaView (XDMF 3, Polyvertex with a
 // radius; contacts as points with force vectors). With pore water also water.xdmf, the grid's cells, and
 // bed.xdmf, grains and grid together. Rewritten whole; of snapshots of one time it lists the last.
 void write_xdmf(const std::filesystem::path& directory, const std::vector<SnapshotInfo>& snapshots);
-
-// What a stage began with: the rows of the series count from here.
-struct StageStart {
-  double time = 0;        // s, since the case began
-  std::int64_t step = 0;  // of the scene's clock; not 0 where the stage goes on as the one before
-  double clock = 0;       // s, Scene::time(step)
-  double end = 0;         // s, of that clock: where the stage is to end, between two steps
-  double energy = 0;      // J
-  dem::Ledger ledger;
-  double drained_top = 0, drained_bottom = 0;  // m3
-  double water_dissipated = 0;                 // J
-};
 
 // checkpoint.h5: all that is needed to go on with the same bits, the series so far included.
 struct Checkpoint {

@@ -248,15 +248,16 @@ std::string wet_xdmf(const std::vector<SnapshotInfo>& snapshots, bool with_grain
 
 SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::string& name, double time,
                             const dem::Scene& scene, const dem::State& staggered,
-                            const std::optional<coupling::WaterFields>& water, const dem::Loads* mean) {
+                            const std::optional<coupling::WaterFields>& water, const dem::Loads* mean,
+                            const StageStart& start) {
   const hdf5::Lock lock;
   SnapshotInfo info{name + ".h5", time, staggered.size(), 0};
   const auto file = hdf5::File::in_memory(directory / info.file);
   file.set("program", std::string("moraine"));
   file.set("name", name);
   file.set("time", time);
-  file.set("step", staggered.step);
-  file.set("stage_time", scene.time(staggered.step));
+  file.set("step", staggered.step - start.step);
+  file.set("stage_time", scene.time(staggered.step) - start.clock);
   file.set("box", scene.box);
   file.set("top_wall", staggered.wall_z);
   const dem::Loads loads = mean ? *mean : dem::loads_of(scene, staggered);

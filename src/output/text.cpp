@@ -34,7 +34,12 @@ void write_text(const std::filesystem::path& path, std::string_view text,
   check(::fsync(file), "write");
   if (!before.empty() && std::rename(path.c_str(), before.c_str()) < 0 && errno != ENOENT)
     check(-1, "rename the file that stood there");
-  check(std::rename(aside.c_str(), path.c_str()), "replace the file");
+  if (std::rename(aside.c_str(), path.c_str()) < 0) {
+    const int cause = errno;
+    if (!before.empty()) std::rename(before.c_str(), path.c_str());
+    errno = cause;
+    check(-1, "replace the file");
+  }
   ::close(file);
 
   // The rename outlives a power cut only once the directory is on disk; some file systems cannot be asked.

@@ -16,7 +16,7 @@ void bench_case(const Options& options, const std::string& stage_name, std::int6
     if (index == c.stages.size()) throw error("--stage ", stage_name, ": the case has no such stage");
   }
   const Start start = start_of(c);
-  output::Checkpoint now = start.before;
+  output::Checkpoint now = foreseen(c, index, start);
   Stage stage = prepare(c, index, start, now);
   const auto water = fill(stage, now.state, now.water, stage.goes_on);
   const auto engine = dem::make_engine(options.backend, options.threads);

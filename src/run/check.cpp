@@ -101,7 +101,7 @@ void check_case(const Options& options) {
   bool complete = true;
   for (std::size_t k = 0; k < c.stages.size(); ++k) {
     const cases::Stage& wanted = c.stages[k];
-    output::Checkpoint now = start.before;
+    output::Checkpoint now = foreseen(c, k, start);
     Stage stage = prepare(c, k, start, now);
     const dem::State& s = now.state;
     const dem::Scene& scene = stage.scene;

@@ -66,12 +66,6 @@ std::vector<dem::Vec3d> scattered(const std::vector<double>& r, double box_x, do
 
 double contacts_each(const dem::State& s) { return 2.0 * static_cast<double>(s.contacts.size()) / s.size(); }
 
-double top_of(const dem::State& s) {
-  double top = 0;
-  for (dem::Index i = 0; i < s.size(); ++i) top = std::max(top, s.x[i].z + s.r[i]);
-  return top;
-}
-
 double median(std::vector<double> v) {
   std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
   return v[v.size() / 2];
@@ -189,6 +183,7 @@ Estimate::Time Estimate::stage(std::size_t index, double duration) {
   if (loose_ && packed_.contacts.empty()) pack();
   dem::State bed = loose_ ? with_contacts(expected_contacts(wanted)) : packed_;
   output::Checkpoint now = start_.before;
+  if (index > 0) now.scene.shear = {};  // with layers of its own
   now.state = std::move(bed);
   Stage stage = prepare(case_, index, start_, now);
   bed = std::move(now.state);
@@ -202,7 +197,7 @@ Estimate::Time Estimate::stage(std::size_t index, double duration) {
   if (wanted.kind == Kind::shear) speed = 3 * std::abs(stage.scene.shear.velocity);
   if (wanted.normal_stress > 0)  // what the wall has pushed comes to rest in a small part of the stage
     speed = std::max(speed, 0.02 * std::sqrt(wanted.normal_stress / case_.grains.density));
-  const double way = top_of(start_.before.state) - top_of(bed);
+  const double way = bed_top(start_.before.state) - bed_top(bed);
   const bool falls = loose_ && index == 0 && way > 0 && case_.gravity > 0 &&
                      stage.scene.top_wall.drive == dem::TopWall::Drive::none;
   const double each = falls ? falling(stage, bed, way, duration) : per_step(stage, bed, speed);
@@ -212,7 +207,7 @@ Estimate::Time Estimate::stage(std::size_t index, double duration) {
 // s a step, mean over the stage.
 double Estimate::falling(const Stage& stage, const dem::State& bed, double way, double duration) {
   const double g = case_.gravity, landed = std::sqrt(2 * way / g), v_end = g * landed;
-  const double high = top_of(start_.before.state), low = top_of(bed);
+  const double high = bed_top(start_.before.state), low = bed_top(bed);
   dem::State apart = with_contacts(0.5);  // what has landed still bounces
   dem::sort_spatially(stage.scene, apart);
   double sum = 0, until = 0;  // s, of steps over the time they stand for

@@ -14,11 +14,6 @@ namespace {
 constexpr double least_between = 3;                             // mean diameters, or layers may meet
 constexpr double usual_porosity = 0.4, loosest_porosity = 0.5;  // of a settled bed
 
-template <class... Parts>
-std::string text(const Parts&... parts) {
-  return error(parts...).what();
-}
-
 // Three digits, for a person to read.
 std::string brief(double x) {
   char digits[32];

@@ -13,11 +13,6 @@ namespace moraine::run {
 
 namespace {
 
-template <class... Parts>
-std::string text(const Parts&... parts) {
-  return error(parts...).what();
-}
-
 // A way in which contacts can swing.
 struct Mode {
   std::string what;
@@ -174,7 +169,7 @@ void check_overlaps(const cases::Case& c, const dem::Scene& scene, const dem::St
 std::vector<std::string> precheck(const cases::Case& c, const Start& start, dem::Engine& engine) {
   std::vector<std::string> warnings;
   for (std::size_t k = 0; k < c.stages.size(); ++k) {
-    output::Checkpoint now = start.before;
+    output::Checkpoint now = foreseen(c, k, start);
     Stage stage = prepare(c, k, start, now);
     const dem::State& s = now.state;
     const bool bed = k == 0 || !c.start.empty();  // or loose grains that will be one

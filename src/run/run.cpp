@@ -89,9 +89,9 @@ class Runner {
         list_snapshots();
       } catch (const Error&) {  // of a full disk, say: the first error counts
       }
-      const bool kept = Files::holds(files_.checkpoint());
-      const std::string after =
-          kept ? "; the last good checkpoint stays in " + files_.checkpoint().string() : "";
+      std::string after;
+      for (const fs::path& kept : {files_.checkpoint_before(), files_.checkpoint()})
+        if (Files::holds(kept)) after = "; the last good checkpoint stays in " + kept.string();
       progress_->say("stopped: " + moraine::in_words(e) + after);
       throw error(moraine::in_words(e), after);
     }
@@ -163,7 +163,7 @@ class Runner {
   void run_stages(bool resuming) {
     if (!resuming) now_ = start_.before;
     now_.case_text = case_.resolved;
-    if (resuming) remove_later_snapshots();
+    if (resuming) remove_later_snapshots(), all_listed_ = false;  // lists lag behind the snapshots
     now_.version = MORAINE_VERSION;
     const std::string header = "# moraine " MORAINE_VERSION ", " + engine_->describe() + ", seed " +
                                std::to_string(case_.grains.seed) + "\n";
@@ -285,16 +285,15 @@ class Runner {
   // as in one go.
   void advance_to_record(const Stage& stage, std::int64_t steps) {
     const std::int64_t m = std::max<std::int64_t>(1, stage.scene.exchange_interval);
-    std::vector<dem::Loads> last;
-    engine_->advance(m > 1 ? steps - m : steps);
+    engine_->advance(steps - (m - 1));
+    take_state();
+    loads_ = dem::loads_of(stage.scene, now_.state);
     for (std::int64_t k = 1; k < m; ++k) {
       engine_->advance(1);
-      last.push_back(dem::loads_of(stage.scene, engine_->state()));
+      take_state();
+      dem::add(loads_, dem::loads_of(stage.scene, now_.state));
     }
-    if (m > 1) engine_->advance(1);
-    take_state();
-    last.push_back(dem::loads_of(stage.scene, now_.state));
-    loads_ = dem::mean(last);
+    loads_ = dem::mean(std::move(loads_), m);
   }
 
   // When the first grains leave, and how many have at the end.
@@ -320,9 +319,9 @@ class Runner {
     const auto count = std::count_if(now_.snapshots.begin(), now_.snapshots.end(),
                                      [&](const auto& s) { return s.file.starts_with(name); });
     std::snprintf(number, sizeof number, "%06lld", static_cast<long long>(count));
-    now_.snapshots.push_back(
-        output::write_snapshot(files_.snapshots(), name + number, now_.rows.back().time, stage.scene,
-                               now_.state, water_ ? std::optional(water_->fields()) : std::nullopt, &loads_));
+    now_.snapshots.push_back(output::write_snapshot(
+        files_.snapshots(), name + number, now_.rows.back().time, stage.scene, now_.state,
+        water_ ? std::optional(water_->fields()) : std::nullopt, &loads_, now_.start));
     all_listed_ = false;
   }
 

@@ -177,13 +177,16 @@ coupling::Water water_of(const cases::Case& c, const cases::Stage& stage, const 
 bool goes_on(const cases::Case& c, const cases::Stage& stage, const Start& start,
              const output::Checkpoint& now) {
   if (!now.state.staggered || stage.zero_kinematics || stage.clear_history) return false;
+  if (c.automatic_dt && !(now.critical_step > 0)) return false;  // dt did not follow the bed so far
   const dem::Scene& before = now.scene;
   dem::Scene scene = scene_of(c, stage, start, now.height_0);
   scene.dt = c.automatic_dt ? before.dt : step_of(c, stage, scene, now.state);
   scene.time_0 = before.time_0, scene.step_0 = before.step_0;
   scene.exchange_interval = before.exchange_interval;
   scene.neighbour_margin = before.neighbour_margin;
-  return scene == before && water_of(c, stage, scene, now.height_0, now.state) == now.water_settings;
+  coupling::Water water = water_of(c, stage, scene, now.height_0, now.state);
+  water.solver = now.water_settings.solver, water.tolerance = now.water_settings.tolerance;
+  return scene == before && water == now.water_settings;
 }
 
 double nominal_rate(const cases::Stage& stage, const output::Checkpoint& now) {  // 1/s, u/H_0 or axial
@@ -195,11 +198,15 @@ double duration_of(const cases::Stage& stage, double strain_rate) {  // s
 }
 
 // Of a stage that shears on with the layers of the one before.
-bool asks_for_other_layers(const cases::Case& c, std::size_t index) {
+std::vector<std::string> asks_for_other_layers(const cases::Case& c, std::size_t index) {
   const cases::Stage& stage = c.stages[index];
-  if (index == 0) return stage.bottom_layer >= 0 || stage.top_layer >= 0;
-  const cases::Stage& before = c.stages[index - 1];
-  return stage.bottom_layer != before.bottom_layer || stage.top_layer != before.top_layer;
+  const auto other = [&](double cases::Stage::*layer) {
+    return stage.*layer >= 0 && (index == 0 || stage.*layer != c.stages[index - 1].*layer);
+  };
+  if (!shears(stage.kind) || (!other(&cases::Stage::bottom_layer) && !other(&cases::Stage::top_layer)))
+    return {};
+  return {"stage " + stage.name +
+          ": bottom_layer and top_layer do not count: the layers are those of the shear before it"};
 }
 
 // What the stage does not want to know of the one before.
@@ -219,12 +226,8 @@ std::vector<std::string> set_reference(const cases::Case& c, std::size_t index, 
   const cases::Stage& stage = c.stages[index];
   dem::State& s = now.state;
   std::vector<std::string> warnings;
-  if (shears(stage.kind) && now.scene.shear.drive != dem::Shear::Drive::none) {
-    if (asks_for_other_layers(c, index))
-      warnings = {"stage " + stage.name +
-                  ": bottom_layer and top_layer do not count: the layers are those of the shear before it"};
-    return warnings;
-  }
+  if (shears(stage.kind) && now.scene.shear.drive != dem::Shear::Drive::none)
+    return asks_for_other_layers(c, index);
   if (shears(stage.kind)) {
     warnings = choose_layers(stage, s);
   } else {
@@ -272,7 +275,11 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, outpu
     now.scene.neighbour_margin = c.neighbour_margin;
     now.start.step = s.step, now.start.clock = now.scene.time(s.step);
     now.start.end += duration_of(stage, nominal_rate(stage, now));
-    return describe(c, index, now);
+    now.water_settings.solver = coupling::Solver(int(c.fluid.solver));
+    now.water_settings.tolerance = c.fluid.tolerance;
+    Stage out = describe(c, index, now);
+    out.warnings = asks_for_other_layers(c, index);
+    return out;
   }
   if (s.staggered && now.scene.grain.mu_d == now.scene.grain.mu_s) dem::mark_slipping(now.scene, s);
   dem::synchronise(now.scene, s);
@@ -289,12 +296,25 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, outpu
   scene.dt = c.automatic_dt ? c.safety * critical_step(scene, s) : step_of(c, stage, scene, s);
   now.scene = scene;
   now.water_settings = water_of(c, stage, scene, now.height_0, s);
+  now.critical_step = 0, now.critical_at = 0;
   now.start = {};
   now.start.end = duration_of(stage, nominal_rate(stage, now));
   Stage out = describe(c, index, now);
   out.goes_on = false, out.warnings = warnings;
   if (c.automatic_dt) fit_step(out, s, scene.dt), now.scene = out.scene;
   return out;
+}
+
+output::Checkpoint foreseen(const cases::Case& c, std::size_t index, const Start& start) {
+  output::Checkpoint now = start.before;
+  if (index == 0) return now;
+  if (shears(c.stages.at(index).kind) && shears(c.stages[index - 1].kind)) {
+    now = foreseen(c, index - 1, start);
+    prepare(c, index - 1, start, now);  // for the layers that it will keep
+  } else {
+    now.scene.shear = {};
+  }
+  return now;
 }
 
 }  // namespace moraine::run

@@ -53,6 +53,8 @@ bool shears(cases::Stage::Kind kind);
 // clock begins at 0. Stages that shear one after another keep their layers, and with them H_0 and what
 // displacement and shear strain are counted from. Throws Error where no grain is left between the layers.
 Stage prepare(const cases::Case& c, std::size_t index, const Start& start, output::Checkpoint& now);
+// What the stage would find if the grains stayed where the start has them: to judge a case before it is run.
+output::Checkpoint foreseen(const cases::Case& c, std::size_t index, const Start& start);
 // The stage that is under way already (after a restart).
 Stage describe(const cases::Case& c, std::size_t index, const output::Checkpoint& now);
 

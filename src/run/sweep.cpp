@@ -131,7 +131,9 @@ class Sweep {
                                  cases::extension_text(options.directory, job.plan.overrides, "../.."));
     job.what = cases::load(directory);
     for (std::size_t k = 0; k < job.what.stages.size(); ++k) job.work += expected_work(job.what, k);
+    const auto has = [&](const char* name) { return fs::exists(directory / "output" / name); };
     if (!options.resume || resolved_before.empty()) return;
+    if (!has("checkpoint.h5") && !has("checkpoint.previous.h5")) return;  // cut off before there were results
     if (const std::string changed = changed_physics(resolved_before, job.what); !changed.empty()) {
       output::write_text(file, before);
       throw error(directory.string(), ": holds results of another version of this case: ", changed,

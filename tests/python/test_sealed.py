@@ -60,7 +60,7 @@ def test_every_damage_of_a_snapshot_is_found(tmp_path):
 
 
 def test_a_series_full_of_garbage_ends_in_seconds(tmp_path, monkeypatch):
-    monkeypatch.setattr(sealed, "patience", 1)
+    monkeypatch.setattr(sealed, "patience", (1, 20e6))
     case = FakeCase(tmp_path / "case")
     case.write(case.history())
     whole = case.file.read_bytes()
@@ -73,7 +73,7 @@ def test_a_series_full_of_garbage_ends_in_seconds(tmp_path, monkeypatch):
 
 
 def test_watch_and_figures_say_so(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(sealed, "patience", 1)
+    monkeypatch.setattr(sealed, "patience", (1, 20e6))
     case = FakeCase(tmp_path / "case")
     case.write(case.history())
     whole = case.file.read_bytes()

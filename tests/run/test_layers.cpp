@@ -101,5 +101,31 @@ TEST_F(Program, RefusesABedThatItsLayersWillSwallow) {
   EXPECT_EQ(good.out.find("to deform"), std::string::npos) << good.out;
 }
 
+// A stage that shears on keeps the layers of the one before, in what is judged before the run, too.
+TEST_F(Program, LayersOfAStageThatShearsOn) {
+  output::Checkpoint c;
+  c.finished = true;
+  c.state = dem::grains_at_rest({d / 2, d / 2}, {{0.1, 0.1, d / 2}, {0.1, 0.1, 1.5 * d}});
+  c.scene.box = {0.2, 0.2, 0};
+  output::write_checkpoint(directory.path() / "two.h5", c);
+  const auto shear = [](const std::string& name, const std::string& more) {
+    return "[[stage]]\nname = \"" + name + "\"\nkind = \"shear\"\nvelocity = \"1 mm/s\"\n" +
+           "duration = 0.01\nnormal_stress = 1000\n" + more;
+  };
+  const std::string head = "start = \"../two.h5\"\n[contact]\nk_n = 1e6\nk_t = 1e6\n[wall]\nmass = 0.2\n",
+                    both = "bottom_layer = 0.03\ntop_layer = 0.03\n",
+                    rest =
+                        "[[stage]]\nname = \"rest\"\nkind = \"consolidate\"\nnormal_stress = 1000\n"
+                        "duration = 0.01\nwall_gamma_n = 20\nwall_gamma_t = 0\n";
+  run(make("on", head + shear("one", both) + shear("two", "")));
+  const auto log = [&](const char* which) { return contents(directory.path() / which / "output/log.txt"); };
+  EXPECT_EQ(log("on").find("do not count"), std::string::npos) << log("on");
+  run(make("other", head + shear("one", both) + shear("two", "top_layer = 0.02\n")));
+  EXPECT_NE(log("other").find("do not count"), std::string::npos) << log("other");
+  // After another stage layers are chosen anew, also from a bed that has been sheared.
+  run(make("anew", "start = \"../on\"\n" + head.substr(head.find('\n') + 1) + rest + shear("one", both)));
+  EXPECT_EQ(log("anew").find("do not count"), std::string::npos) << log("anew");
+}
+
 }  // namespace
 }  // namespace moraine

@@ -1,6 +1,8 @@
 // A stage that is cut in two, so that nothing changes between the halves, ends with the bits of the uncut
 // one: grains, springs, what slips, walls, layers, ledger, water. Between two stages of one case, and with
 // `start`.
+#include <hdf5.h>
+
 #include "program.hpp"
 
 namespace moraine {
@@ -49,6 +51,10 @@ const Kind kinds[] = {
     {"wet",
      "[fluid]\nenabled = true\nviscosity = 1.8e-3\ncompressibility = 1e-6\npermeability_factor = 1e-9\n",
      "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nmu_s = 0.6\nmu_d = 0.3\n", 0.0625},
+    // Seven steps or so between exchanges.
+    {"wet_interval",
+     "[fluid]\nenabled = true\nviscosity = 1.8e-3\ncompressibility = 1e-6\npermeability_factor = 1e-9\n",
+     "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nf = 0.02\n", 0.015625},
     {"wet_tide",
      "[fluid]\nenabled = true\nviscosity = 1.8e-3\ncompressibility = 1e-6\npermeability_factor = 1e-9\n",
      "kind = \"consolidate\"\nwall_gamma_n = 40\nwall_gamma_t = 40\nnormal_stress = 2000\ntop_pressure = "
@@ -114,19 +120,49 @@ TEST_P(Seams, ACutStageEndsWithTheBitsOfTheUncutOne) {
   const auto one = rows(whole), two = rows(cut);
   ASSERT_EQ(one.size() + 1, two.size());  // the seam has a row of either side
   const std::size_t seam = one.size() / 2;
+  const bool dry = std::string(kind.keys).find("[fluid]") == std::string::npos;
   for (std::size_t k = 0; k < two.size(); ++k) {
     const output::Row &a = one[k > seam ? k - 1 : k], &b = two[k];
     SCOPED_TRACE("row " + std::to_string(k));
     EXPECT_EQ(a.shear_strain, b.shear_strain);
     EXPECT_EQ(a.dilation, b.dilation);
-    EXPECT_EQ(a.shear_stress, b.shear_stress);
-    EXPECT_EQ(a.normal_stress, b.normal_stress);
+    if (k != seam + 1 || dry) {  // forces in water are means over an interval, but for a stage's first row
+      EXPECT_EQ(a.shear_stress, b.shear_stress);
+      EXPECT_EQ(a.normal_stress, b.normal_stress);
+    }
     EXPECT_EQ(a.kinetic, b.kinetic);
     EXPECT_NEAR(a.time, b.time, 1e-12);
   }
+  EXPECT_EQ(two[seam + 1].stage_time, 0);
+  EXPECT_EQ(two[seam + 1].step, 0);
+  // So do snapshots: the first of the second stage stands at its beginning.
+  for (const fs::path& file : snapshots_of(cut))
+    if (file.filename() == "02-two-000000.h5") {
+      double time = -1;
+      std::int64_t step = -1;
+      const hid_t h5 = H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+      const hid_t t = H5Aopen(h5, "stage_time", H5P_DEFAULT), n = H5Aopen(h5, "step", H5P_DEFAULT);
+      H5Aread(t, H5T_NATIVE_DOUBLE, &time), H5Aread(n, H5T_NATIVE_INT64, &step);
+      H5Aclose(t), H5Aclose(n), H5Fclose(h5);
+      EXPECT_EQ(time, 0);
+      EXPECT_EQ(step, 0);
+    }
   EXPECT_NEAR(one.back().slip, two[seam].slip + two.back().slip, 1e-9 * std::abs(one.back().slip));
   EXPECT_NEAR(one.back().top_wall_work, two[seam].top_wall_work + two.back().top_wall_work,
               1e-9 * std::abs(one.back().top_wall_work));
+}
+
+// What has followed no bed has no step to go on with.
+TEST_F(Program, AFixedStepIsCarriedOnByAnAutomaticOne) {
+  run(make("bed", "stages = [\"settle\", \"consolidate\"]\n" + small_case()));
+  const auto text = [](const std::string& start, const std::string& more) {
+    return "start = \"../" + start + "\"\nextends = \"../bed\"\nstages = [\"one\"]\n" + more +
+           "[[stage]]\nname = \"one\"\nkind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\n"
+           "zero_kinematics = false\nduration = 0.02\n";
+  };
+  run(make("fixed", text("bed", "")));
+  run(make("automatic", text("fixed", "[model]\ndt = \"auto\"\n")));
+  run(make("fixed_again", text("automatic", "")));
 }
 
 INSTANTIATE_TEST_SUITE_P(EveryKind, Seams, testing::ValuesIn(kinds),
