@@ -51,7 +51,7 @@ const Kind kinds[] = {
     {"wet",
      "[fluid]\nenabled = true\nviscosity = 1.8e-3\ncompressibility = 1e-6\npermeability_factor = 1e-9\n",
      "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nmu_s = 0.6\nmu_d = 0.3\n", 0.0625},
-    // Seven steps or so between exchanges.
+    // Some twenty steps between exchanges.
     {"wet_interval",
      "[fluid]\nenabled = true\nviscosity = 1.8e-3\ncompressibility = 1e-6\npermeability_factor = 1e-9\n",
      "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nf = 0.02\n", 0.015625},
