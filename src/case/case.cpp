@@ -7,6 +7,7 @@
 #include "case/preset.hpp"
 #include "case/read.hpp"
 #include "error.hpp"
+#include "output/files.hpp"
 
 namespace moraine::cases {
 namespace {
@@ -193,6 +194,19 @@ fs::path start_file(const fs::path& directory, const Entry& entry) {
   return path;
 }
 
+// The kind of the last stage of the case that a start file comes from; empty where that is not known.
+string last_kind(const fs::path& start) {
+  if (start.empty()) return {};
+  try {
+    const auto before = read_resolved(output::read_checkpoint(start).case_text);
+    const auto kind = before.find("stage." + split(before.at("stages"), ", ").back() + ".kind");
+    return kind == before.end() ? string()
+                                : std::get<string>(parse_default(*find("stage.kind"), kind->second));
+  } catch (const std::exception&) {  // what is wrong with it is said when its grains are read
+    return {};
+  }
+}
+
 // As a case.toml in SI.
 string text_of(const Draft& draft) {
   string text, table;
@@ -246,7 +260,7 @@ Case load_checked(const fs::path& directory, const std::vector<Override>& overri
   c.start = start_file(directory, draft.entries.at("start"));
 
   if (draft.stages.empty()) throw error(file, ": no stages; expected at least one [[stage]]");
-  string kind_before;
+  string kind_before = last_kind(c.start);
   for (StageDraft& s : draft.stages) {
     Context context{&draft.entries, s.stated + ".", "", kind_before};
     if (s.entries.contains("stage.kind")) context.kind = std::get<string>(s.entries.at("stage.kind").value);

@@ -188,7 +188,7 @@ std::vector<Key> make_keys() {
       row<&S::wall_gamma_n>("stage.wall_gamma_n", "N s/m", "0" + damped + "wall.gamma_n", ">= 0", "normal viscosity against walls"),
       row<&S::wall_gamma_t>("stage.wall_gamma_t", "N s/m", "0" + damped + "wall.gamma_t", ">= 0", "tangential viscosity against walls"),
       row<&S::wall_mu>("stage.wall_mu", "1", "0" + damped + "stage.mu_d", ">= 0", "friction against walls"),
-      row<&S::zero_kinematics>("stage.zero_kinematics", "", "true; another of its kind: false", "", "velocities, spins and rotations begin at zero; by default not where the stage before is of the same kind"),
+      row<&S::zero_kinematics>("stage.zero_kinematics", "", "true; another of its kind: false", "", "velocities, spins and rotations begin at zero; by default not where the stage before, or the last one of `start`, is of the same kind"),
       row<&S::clear_history>("stage.clear_history", "", "false", "", "tangential springs are forgotten when the stage begins"),
       row<&S::fluid>("stage.fluid", "", "fluid.enabled", "", "pore water in this stage"),
       row<&S::fluid_top>("stage.fluid_top", "", "\"drained\"", "drained | impermeable", "the top: at top_pressure, or tight (then the wall carries the water's pressure)"),

@@ -335,7 +335,8 @@ TEST_F(CaseTest, water_that_contradicts_itself) {
                "fluid.x_low_pressure", "0 Pa, or x_low");
   expect_fault({{"fluid.porosity_min", "0.9"}}, "fluid.porosity_min", "less than fluid.porosity_max = 0.9");
   expect_fault({{"fluid.porosity_max", "1"}}, "fluid.porosity_max", "less than 1");
-  for (const char* key : {"viscosity", "compressibility", "density", "porosity_min", "cell", "tolerance"})
+  expect_fault({{"fluid.tolerance", "0.5"}}, "fluid.tolerance", "1e-15 .. 1e-6");
+  for (const char* key : {"viscosity", "compressibility", "density", "porosity_min", "cell"})
     expect_fault({{"fluid." + std::string(key), "0"}}, "fluid." + std::string(key), "> 0");
   expect_fault({{"fluid.cells_x", "-1"}}, "fluid.cells_x", ">= 0");
 }

@@ -109,8 +109,7 @@ TEST_P(Seams, ACutStageEndsWithTheBitsOfTheUncutOne) {
   const fs::path cut =
       make("cut", text(bed(), stage("one", kind.half) + stage("two", kind.half), "\"one\", \"two\""));
   const fs::path half = make("half", text(bed(), stage("one", kind.half), "\"one\""));
-  const fs::path rest =
-      make("rest", text("../half", stage("two", kind.half, "zero_kinematics = false\n"), "\"two\""));
+  const fs::path rest = make("rest", text("../half", stage("two", kind.half), "\"two\""));
   for (const fs::path& one : {whole, cut, half, rest}) ASSERT_NO_FATAL_FAILURE(run(one));
   EXPECT_NE(contents(cut / "output/log.txt").find("goes on as the one before"), std::string::npos);
   EXPECT_TRUE(end_of(whole) == end_of(cut)) << "two stages of one case";
