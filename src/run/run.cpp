@@ -168,7 +168,8 @@ class Runner {
     const std::string header = "# moraine " MORAINE_VERSION ", " + engine_->describe() + ", seed " +
                                std::to_string(case_.grains.seed) + "\n";
     output::write_text(files_.resolved(), header + case_.resolved);
-    progress_->say((resuming ? "resumed: " : "") + case_.title + ": " +
+    progress_->say((resuming ? "resumed: " : "") +
+                   (case_.title.empty() ? case_.directory.string() : case_.title) + ": " +
                    std::to_string(start_.before.state.size()) + " grains, " + engine_->describe());
     for (const std::string& c : changes_) progress_->say("changed: " + c);
     for (const std::string& w : warnings_) progress_->say("warning: " + w);
