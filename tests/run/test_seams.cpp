@@ -15,6 +15,8 @@ struct Kind {
   double half;        // s, duration of either half: whole records, exact in binary
 };
 
+void PrintTo(const Kind& kind, std::ostream* out) { *out << kind.name; }
+
 // Beside the bed that each starts from. Records every 1/64 s.
 const Kind kinds[] = {
     {"settle", "", "kind = \"settle\"\nwall_gamma_n = 40\nwall_gamma_t = 40\n", 0.0625},
