@@ -36,7 +36,7 @@ class TimeEstimate : public Program {
     const double expected = seconds(check(which, overrides)), before = spent();
     ASSERT_NO_FATAL_FAILURE(run(which, overrides, {"--threads", "1"}));
     const double took = spent() - before;
-    ASSERT_GT(took, 1);
+    ASSERT_GT(took, 0.2);  // or rounding counts
     EXPECT_GT(expected, took / 1.6);
     EXPECT_LT(expected, took * 1.6);
   }
