@@ -193,4 +193,30 @@ inline double largest_difference(const std::vector<double>& a, const std::vector
   return worst;
 }
 
+// What the grains gain the water loses, under either top. also(state, sum of |force|): what else must hold.
+template <class Also>
+void expect_momentum_kept(const WetBed& bed, Also&& also) {
+  for (const TopSide top : {TopSide::drained, TopSide::impermeable}) {
+    Water w = water_over(bed);
+    w.top = top;
+    w.sides.high[2].value = top == TopSide::drained ? 3e3 : 0;
+    if (top == TopSide::impermeable) w.sides = {};
+    WetRun run(bed, w);
+    run.advance(3000);
+    const dem::State s = run.engine->state();
+    const WaterFields f = run.water->fields();
+    dem::Vec3d sum{0, 0, 0};
+    double scale = 0, floor = 0;  // floor: the water's thrust on it, downwards
+    for (const dem::Vec3d& force : s.water_force) sum += force, scale += dem::length(force);
+    for (std::size_t c = 0; c < f.grid.cell(0, 0, 1); ++c) floor += f.grid.face_area(2) * f.pressure[c];
+    const double wall = run.scene.area() * run.water->state().wall_pressure;
+    ASSERT_GT(scale, 1);
+    // Sums of some thousand roundings; 1e-10 is asked for.
+    EXPECT_NEAR(sum.x / scale, 0, 1e-12);
+    EXPECT_NEAR(sum.y / scale, 0, 1e-12);
+    EXPECT_NEAR((sum.z + wall - floor) / scale, 0, 1e-12);
+    also(s, scale);
+  }
+}
+
 }  // namespace moraine::coupling
