@@ -1,8 +1,6 @@
 // Memory layout of what the contact loop reads and writes for each grain, in SIMD rows: two cache lines that
 // it reads and one that it adds to. They are kept apart so that threads never write into what others read.
 #pragma once
-#include <algorithm>
-
 #include "dem/scene.hpp"
 #include "dem/state.hpp"
 
@@ -46,32 +44,6 @@ struct alignas(64) LoadRow {
 struct alignas(32) WaterRow {
   Vec3d f;
   double unused;
-};
-
-// Grains are dealt into chunks of neighbours in memory order: the unit of work of a thread and of every sum.
-// Their number depends on the number of grains alone, so results do not depend on the number of threads.
-inline Index chunk_size(Index grains) {
-  const Index sixteenth = (grains / 16 + 63) / 64 * 64;
-  return std::clamp<Index>(sixteenth, 128, 1024);
-}
-inline Index chunk_count(Index grains) { return (grains + chunk_size(grains) - 1) / chunk_size(grains); }
-
-// A chunk's sums are sums of its groups, each added up by itself first, so that a GPU can do many at a time.
-constexpr Index group_size = 32;
-MORAINE_HD bool ends_group(Index i) { return (i + 1) % group_size == 0; }
-
-// Such a sum over some grains of a chunk, that come by index.
-class GroupedSum {
- public:
-  void add(Index i, double number) {
-    if (i / group_size != group_) sum_ += group_sum_, group_sum_ = 0, group_ = i / group_size;
-    group_sum_ += number;
-  }
-  double total() const { return sum_ + group_sum_; }
-
- private:
-  double sum_ = 0, group_sum_ = 0;
-  Index group_ = 0;
 };
 
 // Sides of the box for the minimum image: x - side * round(x * inverse); both zero along an open side.

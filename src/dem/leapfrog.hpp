@@ -27,10 +27,11 @@ struct Mobility {
   MORAINE_HD Vec3d spin_acceleration(const Vec3d& torque) const { return inverse_inertia * torque; }
 };
 
-MORAINE_HD Mobility mobility(const Scene& scene, double r, Role role) {
+// A grain of a layer answers along z at most.
+MORAINE_HD Mobility mobility(const Scene& scene, double r, BodyId part_of) {
   const double m = sphere_mass(scene.density, r);
-  if (role == Role::free) return {1 / m, 1 / m, -scene.submerged_gravity(), 1 / (0.4 * m * r * r)};
-  return {0, scene.shear.hold_z ? 0 : 1 / m, 0, 0};
+  if (part_of == BodyId::none) return {1 / m, 1 / m, -scene.submerged_gravity(), 1 / (0.4 * m * r * r)};
+  return {0, scene.is_rigid(part_of) ? 0 : 1 / m, 0, 0};
 }
 // The same from a grain's row, which says by its inverse_inertia whether the grain is free.
 MORAINE_HD Mobility mobility(const Scene& scene, const GrainRow& g) {

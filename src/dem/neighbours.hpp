@@ -4,20 +4,10 @@
 #pragma once
 #include "backend/host.hpp"
 #include "dem/grain.hpp"
+#include "dem/sums.hpp"
 #include "error.hpp"
 
 namespace moraine::dem {
-
-// The order in which a grain adds up its contacts: those within its chunk, those with later chunks, those
-// with earlier ones, each by index. It is the order in which PairEngine comes by them.
-struct SumOrder {
-  Index chunk;
-  MORAINE_HD int rank(Index i, Index j) const { return i / chunk == j / chunk ? 0 : j > i ? 1 : 2; }
-  MORAINE_HD bool before(Index i, Index a, Index b) const {
-    const int ra = rank(i, a), rb = rank(i, b);
-    return ra != rb ? ra < rb : a < b;
-  }
-};
 
 struct CellGrid {
   Vec3d origin, inverse_cell;
@@ -116,14 +106,15 @@ struct Clear {
 struct Rows {
   CellGrid grid;
   const GrainRow* grains;
-  const Role* role;
+  const BodyId* part_of;
   const std::int32_t *order, *first, *end;
   double margin;
-  bool half, skip_held;
-  SumOrder sum_order;
-  std::int64_t* count;      // pass 1
-  const std::int64_t* row;  // pass 2
-  Index* neighbour;
+  bool half;
+  std::array<bool, body_ids> rigid{};  // pairs of such grains are left out
+  ContactOrder sum_order;
+  std::int64_t* count;                // pass 1
+  const std::int64_t* row = nullptr;  // pass 2
+  Index* neighbour = nullptr;
 
   MORAINE_HD void operator()(std::int64_t g) const {
     const auto i = static_cast<Index>(g);
@@ -134,7 +125,7 @@ struct Rows {
       for (std::int32_t k = first[cell]; k < end[cell]; ++k) {
         const Index j = order[k];
         if (j == i || (half && j < i)) continue;
-        if (skip_held && role[i] != Role::free && role[j] != Role::free) continue;
+        if (rigid[static_cast<int>(part_of[i])] && rigid[static_cast<int>(part_of[j])]) continue;
         const Vec3d d = nearest_image(grid.sides, a.x - grains[j].x);
         const double reach = a.r + grains[j].r + margin;
         if (dot(d, d) >= reach * reach) continue;
@@ -159,13 +150,21 @@ struct Neighbours {
   std::int64_t total = 0;
 
   // half: each pair once, in the row of its lower index. Throws Error if a coordinate is not finite.
-  void build(const Space& space, const Scene& scene, const GrainRow* grains, const Role* role, Index n,
+  void build(const Space& space, const Scene& scene, const GrainRow* grains, const BodyId* part_of, Index n,
              double r_max, double margin, bool half) {
     const Cells cells = sort_into_cells(space, scene, grains, n, 2 * r_max + margin);
     count_.resize(n + 1), row.resize(n + 1);
-    search::Rows rows{cells.grid,    grains,  role,   cells.order,        cells.first,
-                      cells.end,     margin,  half,   scene.shear.hold_z, {chunk_size(n)},
-                      count_.data(), nullptr, nullptr};
+    search::Rows rows{.grid = cells.grid,
+                      .grains = grains,
+                      .part_of = part_of,
+                      .order = cells.order,
+                      .first = cells.first,
+                      .end = cells.end,
+                      .margin = margin,
+                      .half = half,
+                      .sum_order = {chunk_size(n)},
+                      .count = count_.data()};
+    for (int id = 0; id < body_ids; ++id) rows.rigid[id] = scene.is_rigid(static_cast<BodyId>(id));
     space.write(count_.data() + n, std::int64_t{0});
     space.for_each(n, rows);
     space.exclusive_scan(count_.data(), row.data(), n + 1);

@@ -36,7 +36,7 @@ State grains_at_rest(std::vector<double> r, std::vector<Vec3d> x) {
   s.x_start = x;
   s.x = std::move(x);
   for (auto* v : {&s.v, &s.omega, &s.rotation, &s.force, &s.torque}) v->assign(n, Vec3d{0, 0, 0});
-  s.role.assign(n, Role::free);
+  s.part_of.assign(n, BodyId::none);
   return s;
 }
 

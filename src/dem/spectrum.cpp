@@ -31,15 +31,15 @@ Resistance dashpots(const ContactParameters& p) { return {p.gamma_n, p.mu_s > 0 
 class Network {
  public:
   Network(const Scene& scene, const State& s)
-      : n_(s.size()), freedoms_(6 * s.size() + 2), role_(s.role), motion_(2 * s.size() + 1) {
+      : n_(s.size()), freedoms_(6 * s.size() + 2), part_of_(s.part_of), motion_(2 * s.size() + 1) {
     const auto root = [](double inverse_mass) { return std::sqrt(inverse_mass); };
     double layer_mass = 0;
     for (Index i = 0; i < n_; ++i) {
-      const Mobility m = mobility(scene, s.r[i], s.role[i]);
+      const Mobility m = mobility(scene, s.r[i], s.part_of[i]);
       const double xy = root(m.inverse_mass_xy), spin = root(m.inverse_inertia);
       root_.push_back({xy, xy, root(m.inverse_mass_z)});
       root_.push_back({spin, spin, spin});
-      if (s.role[i] == Role::top) layer_mass += sphere_mass(scene.density, s.r[i]);
+      if (s.part_of[i] == BodyId::top_layer) layer_mass += sphere_mass(scene.density, s.r[i]);
     }
     if (scene.top_wall.drive == TopWall::Drive::stress) wall_root_ = root(1 / scene.top_wall.mass);
     if (scene.shear.drive == Shear::Drive::stress && layer_mass > 0) layer_root_ = root(1 / layer_mass);
@@ -66,7 +66,7 @@ class Network {
     const double layer = layer_root_ * v[6 * n_ + 1];
     if (layer_root_ > 0)
       for (Index i = 0; i < n_; ++i)
-        if (role_[i] == Role::top) motion_[2 * i].x = layer;
+        if (part_of_[i] == BodyId::top_layer) motion_[2 * i].x = layer;
     motion_[2 * n_] = {0, 0, wall_root_ * v[6 * n_]};
 
     std::vector<Vec3d>& load = load_;
@@ -75,7 +75,7 @@ class Network {
 
     double layer_force = 0;
     for (Index i = 0; i < n_; ++i)
-      if (role_[i] == Role::top) layer_force += load[2 * i].x;
+      if (part_of_[i] == BodyId::top_layer) layer_force += load[2 * i].x;
     for (Index k = 0; k < 2 * n_; ++k)
       for (int a = 0; a < 3; ++a) y[3 * k + a] = root_[k][a] * load[k][a];
     y[6 * n_] = wall_root_ * load[2 * n_].z;
@@ -106,7 +106,7 @@ class Network {
 
   Index n_;
   std::size_t freedoms_;
-  std::vector<Role> role_;
+  std::vector<BodyId> part_of_;
   std::vector<Vec3d> root_;  // 1/sqrt(kg), 1/sqrt(kg m2)
   double wall_root_ = 0, layer_root_ = 0;
   std::vector<Bond> bonds_;

@@ -4,16 +4,16 @@
 // stage the state is staggered (leapfrog): positions, springs and forces belong to step n, velocities and
 // spins to n - 1/2. Between stages it is not: velocities and spins belong to n.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <vector>
 
+#include "dem/body/body.hpp"
 #include "dem/vec3.hpp"
 
 namespace moraine::dem {
 
 using Index = std::int32_t;
-
-enum class Role : std::uint8_t { free = 0, bottom = 1, top = 2 };  // sheared layers, par. 26
 
 struct Contact {
   Index i, j;       // i < j, memory order
@@ -21,11 +21,9 @@ struct Contact {
   double slipping;  // 1 if it slipped in the last step, else 0; counts only where mu_d < mu_s
 };
 
-enum class WallName : std::int32_t { floor = 0, top = 1 };
-
 struct WallContact {
   Index i;
-  WallName wall;
+  BodyId wall;
   Vec3d delta_t;
   double slipping;
 };
@@ -34,7 +32,7 @@ struct WallContact {
 struct Ledger {
   double slip = 0;           // dissipated by sliding friction
   double viscous = 0;        // dissipated by gamma_n, gamma_t
-  double top_wall = 0;       // work done on the grains and the wall by the load
+  double top_wall = 0;       // work done on the grains and the planes by what moves planes
   double layers = 0;         // work done on the grains by the driven layers
   double viscous_power = 0;  // W, at the present step
   double water = 0;          // work done on the grains and the wall by pore water
@@ -48,33 +46,40 @@ struct WaterReaction {
   double wall_between = 0;  // N, on the top wall at the steps up to the next exchange
 };
 
+// A body at one step. What does not change or is not driven along an axis is zero there.
+struct BodyState {
+  Vec3d x;      // m, of a plane along its normal, where it moves
+  Vec3d v;      // m/s
+  Vec3d force;  // N, of the grains on it
+};
+
 struct State {
-  std::vector<Index> id;           // 0 .. N-1, the row in every output file
-  std::vector<double> r;           // m
-  std::vector<Vec3d> x;            // m; not wrapped into the box while a stage runs
-  std::vector<Vec3d> v;            // m/s
-  std::vector<Vec3d> omega;        // rad/s
-  std::vector<Vec3d> rotation;     // rad, integral of omega (par. 45)
-  std::vector<Vec3d> force;        // N, by contacts with grains and walls at step n; without gravity
-  std::vector<Vec3d> torque;       // N m
-  std::vector<Vec3d> water_force;  // N, by pore water at the last exchange; empty where there is none
-  std::vector<Vec3d> x_start;      // m, where the displacement is counted from
-  std::vector<Role> role;
+  std::vector<Index> id;                   // 0 .. N-1, the row in every output file
+  std::vector<double> r;                   // m
+  std::vector<Vec3d> x;                    // m; not wrapped into the box while a stage runs
+  std::vector<Vec3d> v;                    // m/s
+  std::vector<Vec3d> omega;                // rad/s
+  std::vector<Vec3d> rotation;             // rad, integral of omega (par. 45)
+  std::vector<Vec3d> force;                // N, by contacts with grains and walls at step n; without gravity
+  std::vector<Vec3d> torque;               // N m
+  std::vector<Vec3d> water_force;          // N, by pore water at the last exchange; empty where there is none
+  std::vector<Vec3d> x_start;              // m, where the displacement is counted from
+  std::vector<BodyId> part_of;             // what the grain is part of: none, or a layer
   std::vector<Contact> contacts;           // overlapping pairs, sorted by (i, j)
   std::vector<WallContact> wall_contacts;  // sorted by (wall, i)
 
-  double wall_z = 0;       // m, top wall
-  double wall_v = 0;       // m/s
-  double wall_force = 0;   // N, of the grains on the top wall, upwards
-  double shear_force = 0;  // N, sum of x forces of the grains on the top layer
-  WaterReaction water;     // at the present step
-  double layer_u = 0;      // m/s, velocity of the top layer
+  std::array<BodyState, body_ids> bodies{};  // by BodyId
+  WaterReaction water;                       // at the present step
   Ledger ledger;
 
   std::int64_t step = 0;  // steps since the stage began; t = Scene::time(step)
   bool staggered = false;
 
   Index size() const { return static_cast<Index>(r.size()); }
+  const BodyState& at(BodyId id) const { return bodies[static_cast<std::size_t>(id)]; }
+  BodyState& at(BodyId id) { return bodies[static_cast<std::size_t>(id)]; }
+  double wall_z() const { return at(BodyId::top_wall).x.z; }  // m, height of the top wall
+  double& wall_z() { return at(BodyId::top_wall).x.z; }
 };
 
 }  // namespace moraine::dem

@@ -13,7 +13,7 @@
 #pragma once
 #include <cstdint>
 
-#include "dem/drive.hpp"
+#include "dem/body/motion.hpp"
 #include "dem/grain.hpp"
 
 namespace moraine::dem {
@@ -23,10 +23,10 @@ class Surroundings {
   virtual ~Surroundings() = default;
 
   virtual bool stale() const = 0;  // changes in solve() only
-  virtual void remap(const GrainRow* grains, const Drive& drive) = 0;
+  virtual void remap(const GrainRow* grains, const BodyMotion& bodies) = 0;
   virtual void displace(Index chunk, const GrainRow* grains) = 0;
-  // drive: at step n, wall already there. t: s, since the stage began.
-  virtual WaterReaction solve(const Drive& drive, double t) = 0;
+  // bodies: at step n, planes already there. t: s, since the stage began.
+  virtual WaterReaction solve(const BodyMotion& bodies, double t) = 0;
   // force: by grain in memory order, though only rows of the chunk's grains need exist.
   virtual void push(Index chunk, const GrainRow* grains, WaterRow* force) = 0;
 };

@@ -1,0 +1,195 @@
+// The contact law: one function for grain against grain and grain against a plane, on the CPU and on the GPU.
+// Damsgaard et al. (2013), eqs. 4-8; every quantity acts on grain i and points from j to i.
+//
+//   f_n = -k_n delta_n - gamma_n v.n        (eq. 6; never pulls)
+//   v_c = v_ij + l_i n x omega_i + l_j n x omega_j,  l = r + delta_n/2   (eq. 7 with the lever arm of eq. 4)
+//   delta_t turns with the contact, then grows by the tangential part of v_c dt
+//   f_t = -k_t delta_t - gamma_t v_t,  |f_t| <= mu f_n        (eqs. 6 and 8)
+//   torque on i: l_i f_t x n,  on j: l_j f_t x n              (eq. 4)
+//
+// Its parts (spring, friction, damping, and more) are types of their own (linear_spring.hpp, ...); which of
+// them are compiled together is said in laws.hpp.
+//
+// Time levels: n and delta_n belong to step n, the velocities to n - 1/2, so v_c dt is the displacement
+// between two steps (second order). Only the viscous parts need velocities at step n; they come as a second
+// Motion.
+#pragma once
+#include <type_traits>
+
+#include "dem/law/friction.hpp"
+#include "dem/law/geometry.hpp"
+#include "dem/law/linear_spring.hpp"
+#include "dem/law/viscosity.hpp"
+
+namespace moraine::dem {
+
+// A law of such parts. More: what else acts along the normal while grains touch, each with
+//   normal(p, g)        N, positive pushes apart; friction's limit does not see it
+//   stored(p, overlap)  J
+//   used(p)             whether these parameters ask for it
+template <class Normal_, class Friction_, class Damping_, class... More>
+struct Law {
+  using Normal = Normal_;
+  using Friction = Friction_;
+  using Damping = Damping_;
+  static constexpr bool rubs = Friction::rubs, softens = Friction::softens, damps = Damping::damps;
+  static constexpr bool has_more = sizeof...(More) > 0;
+
+  template <class P, class T>
+  MORAINE_HD static T more_normal(const P& p, const Geometry<T>& g) {
+    return (T(0) + ... + More::normal(p, g));
+  }
+  template <class P>
+  static double stored_normal(const P& p, double overlap) {
+    return (Normal::stored(p, overlap) + ... + More::stored(p, overlap));
+  }
+  template <class Part>
+  static constexpr bool has = (std::is_same_v<Part, More> || ...);
+};
+
+// Whether what a contact dissipates is worked out.
+enum class Account { none, energy };
+
+// What a contact remembers.
+template <class T>
+struct Spring {
+  Vec3<T> delta_t;  // m
+  T slipping;       // 1 after a step that slipped, else 0 (softening only)
+};
+
+template <class T>
+struct Action {
+  Vec3<T> f;                         // N, on i; j gets -f
+  Vec3<T> f_x_n;                     // N, f_t x n: times l gives the torque, on i and j alike
+  T slip;                            // J, dissipated by sliding in this step (with a ledger only)
+  Vec3<T> f_viscous, f_x_n_viscous;  // the part of both that damping contributes (with a ledger only)
+};
+
+// How a contact moves in a step, with normal and lever arms as they were in the middle of it: taken at its
+// end they would make the work of the spring first order in dt.
+template <class T>
+struct Slide {
+  Vec3<T> n_mid;
+  Vec3<T> v_c;  // m/s, with a part along n_mid that carry() takes out
+  T twist;      // rad, about n: the mean spin of both, times dt
+};
+
+template <class T>
+MORAINE_HD Slide<T> slide(double dt, const Geometry<T>& g, const Motion<T>& before) {
+  const T v_n = dot(before.v, g.n);
+  const T half_turn = T(0.5 * dt) * g.curvature;
+  const Vec3<T> n_mid = less(g.n, half_turn, less(before.v, v_n, g.n));
+  const T shortening = T(0.25 * dt) * v_n;
+  const Vec3<T> spin = axpy(g.l_i - shortening, before.omega_i, (g.l_j - shortening) * before.omega_j);
+  return {n_mid, cross_plus(n_mid, spin, before.v), T(0.5 * dt) * dot(g.n, before.omega_i + before.omega_j)};
+}
+
+// Where a step puts a contact's spring if it does not slip. The old spring turns with the pair: about n, then
+// from the old tangent plane into the new one. Both keep its length to fourth order in the angle, so a
+// contact that is carried round for long loses nothing.
+template <class T>
+MORAINE_HD Vec3<T> carry(double dt, const Geometry<T>& g, const Slide<T>& s, const Vec3<T>& old) {
+  const Vec3<T> mean = axpy(T(0.5 * dt), s.v_c, old);
+  const Vec3<T> turned = cross_plus(s.twist * g.n, mean, less(old, T(0.5) * s.twist * s.twist, old));
+  const Vec3<T> sum = axpy(T(dt), s.v_c, turned);
+  return less(sum, dot(g.n, sum), s.n_mid);
+}
+
+// Normal force, N; never pulls.
+template <class L, class P, class T>
+MORAINE_HD T normal_force(const P& p, const Geometry<T>& g, const Motion<T>& now) {
+  T f_n = L::Normal::force(p, g);
+  if constexpr (L::damps) f_n = L::Damping::normal(p, g, now, f_n);
+  return select(g.delta_n < T(0), f_n, T(0));
+}
+
+// The tangential force before Coulomb's limit, N, where damping adds to the spring.
+template <class L, class P, class T>
+MORAINE_HD Vec3<T> damped_tangential(const P& p, const Geometry<T>& g, const Motion<T>& now,
+                                     const Vec3<T>& delta_t) {
+  return L::Damping::tangential(p, g, now, T(-p.k_t) * delta_t);
+}
+
+// How firmly the contact holds: the normal force and the share of the tangential force that Coulomb's limit
+// leaves, 1 where it does not slip. `delta_t` is what carry gives.
+template <class T>
+struct Grip {
+  T f_n, share;
+};
+
+template <class L, class P, class T>
+MORAINE_HD Grip<T> grip(const P& p, const Geometry<T>& g, const Motion<T>& now, const Vec3<T>& delta_t,
+                        const T& slipping) {
+  const T f_n = normal_force<L>(p, g, now);
+  if constexpr (!L::rubs) {
+    return {f_n, T(0)};
+  } else {
+    const T limit = L::Friction::limit(p, f_n, slipping);
+    T size2;  // |f_t|^2
+    if constexpr (L::damps) {
+      const Vec3<T> f_t = damped_tangential<L>(p, g, now, delta_t);
+      size2 = dot(f_t, f_t);
+    } else {
+      size2 = T(p.k_t * p.k_t) * dot(delta_t, delta_t);
+    }
+    return {f_n, select(size2 > limit * limit, T(p.mu_d) * f_n / sqrt(size2), T(1))};
+  }
+}
+
+// The forces; the spring is left at what it carries. dt = 0: no step was taken, so what slipped still slips.
+template <class L, Account account, class P, class T>
+MORAINE_HD Action<T> act(const P& p, double dt, const Geometry<T>& g, const Motion<T>& now,
+                         const Vec3<T>& delta_t, const Grip<T>& grip, Spring<T>& spring) {
+  constexpr bool ledger = account == Account::energy;
+  const T zero(0);
+  const Vec3<T> none{zero, zero, zero};
+  Action<T> a{none, none, zero, none, none};
+  const auto touching = g.delta_n < zero;
+  if constexpr (L::damps && ledger)
+    a.f_viscous = select(touching, L::Normal::rest(p, g, grip.f_n), zero) * g.n;
+  T f_n = grip.f_n;
+  if constexpr (L::has_more) f_n = f_n + select(touching, L::more_normal(p, g), zero);
+  if constexpr (!L::rubs) {
+    a.f = f_n * g.n;
+    return a;
+  } else {
+    Vec3<T> f_t, kept;
+    if constexpr (!L::damps) {
+      kept = grip.share * delta_t;
+      f_t = T(-p.k_t) * kept;
+    } else {  // f_t is not the spring's alone
+      f_t = grip.share * damped_tangential<L>(p, g, now, delta_t);
+      const T carried = T(p.k_t) * sqrt(dot(delta_t, delta_t)), dynamic = T(p.mu_d) * grip.f_n;
+      kept = select((grip.share < T(1)) & (carried > dynamic), dynamic / carried, T(1)) * delta_t;
+      kept = select(touching, kept, none);
+    }
+    a.f = axpy(f_n, g.n, f_t);
+    a.f_x_n = cross(f_t, g.n);
+    if constexpr (ledger) {
+      // Mean force times plastic displacement; a contact that opens gives up what its spring still held.
+      a.slip = T(0.5 * p.k_t) * dot(spring.delta_t + kept, delta_t - kept);
+      if constexpr (L::damps) {
+        const Vec3<T> f_t_viscous = axpy(T(p.k_t), kept, f_t);
+        a.f_viscous += f_t_viscous;
+        a.f_x_n_viscous = cross(f_t_viscous, g.n);
+      }
+    }
+    spring.delta_t = kept;
+    if constexpr (L::softens) {
+      const T slips = select((grip.share < T(1)) & touching, T(1), zero);
+      spring.slipping = dt == 0 ? max(slips, spring.slipping) : slips;
+    }
+    return a;
+  }
+}
+
+// The whole law. dt = 0 evaluates the forces and leaves the spring as it is.
+template <class L, Account account, class P, class T>
+MORAINE_HD Action<T> contact_law(const P& p, double dt, const Geometry<T>& g, const Motion<T>& before,
+                                 const Motion<T>& now, Spring<T>& spring) {
+  Vec3<T> delta_t{};
+  if constexpr (L::rubs) delta_t = carry(dt, g, slide(dt, g, before), spring.delta_t);
+  return act<L, account>(p, dt, g, now, delta_t, grip<L>(p, g, now, delta_t, spring.slipping), spring);
+}
+
+}  // namespace moraine::dem

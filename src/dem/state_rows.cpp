@@ -1,0 +1,119 @@
+#include "dem/state_rows.hpp"
+
+#include "dem/order.hpp"
+
+namespace moraine::dem {
+
+std::vector<GrainRow> grain_rows(const Scene& scene, const State& s) {
+  std::vector<GrainRow> rows(s.size());
+  for (Index i = 0; i < s.size(); ++i) {
+    GrainRow& g = rows[i];
+    const BodyId layer = s.part_of[i];
+    const Mobility m = mobility(scene, s.r[i], layer);
+    g = {s.x[i], s.r[i], s.v[i], s.r[i], s.omega[i], m.inverse_mass_z, s.rotation[i], m.inverse_inertia};
+    if (layer == BodyId::none) continue;
+    const Drive& along_x = scene.body(layer).x;
+    const double u = along_x.kind == Drive::Kind::stress ? s.at(layer).v.x : along_x.velocity;
+    g.v = {u, 0, scene.is_rigid(layer) ? 0 : s.v[i].z};
+    g.omega = {0, 0, 0};
+  }
+  return rows;
+}
+
+NowRow now_row(const GrainRow& grain) { return {grain.v, 0, grain.omega, 0}; }
+
+Vec3d kick(const Scene& scene, const State& s, Index i) {
+  if (s.water_force.empty()) return s.force[i];
+  return with_water(scene, s.step, {s.force[i], 0, {}, 0}, s.water_force[i]).f;
+}
+
+void start_half_a_step_back(const Scene& scene, const Reaction& reaction, const WaterReaction& water,
+                            BodyMotion& bodies) {
+  bodies.take(scene, reaction, water);
+  bodies.half_step(scene, -1);
+  bodies.take(scene, reaction, water);  // now that velocities are those of n - 1/2
+  bodies.ledger = {};
+  bodies.ledger.viscous_power = bodies.viscous_power();
+}
+
+void half_step_back(const Scene& scene, GrainRow& g, const LoadRow& whole) {
+  const Mobility m = mobility(scene, g);
+  g.v = axpy(-0.5 * scene.dt, m.acceleration(whole.f), g.v);
+  g.omega = axpy(-0.5 * scene.dt, m.spin_acceleration(whole.torque), g.omega);
+}
+
+void append_grain(State& s, const GrainRow& g, const LoadRow& load, BodyId part_of) {
+  s.r.push_back(g.r);
+  s.x.push_back(g.x);
+  s.v.push_back(g.v);
+  s.omega.push_back(g.omega);
+  s.rotation.push_back(g.rotation);
+  s.force.push_back(load.f);
+  s.torque.push_back(load.torque);
+  s.part_of.push_back(part_of);
+}
+
+// What a contact remembers under this law: without friction there is no spring, and without softening it does
+// not matter whether it slips, whatever an earlier stage has left.
+static Spring<double> remembered(const ContactParameters& p, const Spring<double>& s) {
+  return {p.k_t > 0 && p.mu_s > 0 ? s.delta_t : Vec3d{}, SofteningCoulomb::used(p) ? s.slipping : 0};
+}
+
+void append_contact(State& s, const Scene& scene, const Sides& sides, const GrainRow& a, const GrainRow& b,
+                    Index i, Index j, const Spring<double>& spring) {
+  if (!(between_grains(nearest_image(sides, a.x - b.x), a.r + b.r, a.r - b.r).delta_n < 0)) return;
+  const auto [delta_t, slipping] = remembered(scene.with(Material::grain), spring);
+  s.contacts.push_back({i, j, delta_t, slipping});
+}
+
+void append_wall_contact(State& s, const Scene& scene, const Plane& plane, const GrainRow& g, Index i,
+                         const Spring<double>& spring) {
+  if (!(plane.gap(g.x, g.r) < 0)) return;
+  const auto [delta_t, slipping] = remembered(scene.with(plane.material), spring);
+  s.wall_contacts.push_back({i, plane.id, delta_t, slipping});
+}
+
+void finish_state(State& s, const BodyMotion& bodies) {
+  sort_contacts(s);
+  store(bodies, s);
+  s.staggered = true;
+}
+
+namespace {
+
+// Velocities and spins of grains by half a step dt, forwards or back, with the forces as they stand.
+void half_step(const Scene& scene, State& s, double dt) {
+  for (Index i = 0; i < s.size(); ++i) {
+    const Mobility m = mobility(scene, s.r[i], s.part_of[i]);
+    s.v[i] = axpy(0.5 * dt, m.acceleration(kick(scene, s, i)), s.v[i]);
+    s.omega[i] = axpy(0.5 * dt, m.spin_acceleration(s.torque[i]), s.omega[i]);
+  }
+}
+
+void half_step_of_bodies(const Scene& scene, State& s, double sign) {
+  BodyMotion bodies = motion_of(scene, s);
+  bodies.half_step(scene, sign);
+  store(bodies, s);
+}
+
+}  // namespace
+
+void synchronise(const Scene& scene, State& s) {
+  if (!s.staggered) return;
+  half_step(scene, s, scene.dt);
+  half_step_of_bodies(scene, s, 1);
+  s.staggered = false;
+}
+
+void change_step(Scene& scene, State& s, double dt) {
+  const bool staggered = s.staggered;
+  synchronise(scene, s);
+  scene.time_0 = scene.time(s.step), scene.step_0 = s.step;
+  scene.dt = dt;
+  if (!staggered) return;
+  half_step(scene, s, -dt);
+  half_step_of_bodies(scene, s, -1);
+  s.staggered = true;
+}
+
+}  // namespace moraine::dem

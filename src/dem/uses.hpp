@@ -1,0 +1,61 @@
+// What a scene uses, and the compiled laws it takes for that. What it does not use costs it nothing: neither
+// a term in a loop nor a task in its step.
+#pragma once
+#include <utility>
+
+#include "dem/scene.hpp"
+#include "error.hpp"
+
+namespace moraine::dem {
+
+struct Uses {
+  bool friction = false;   // tangential springs and torques, between grains or at planes
+  bool softening = false;  // mu_d < mu_s
+  bool damped_grains = false;
+  bool damped = false;  // between grains or at planes: velocities at step n are needed
+  bool ledger = false;
+  bool water = false;
+
+  bool damping_ledger() const { return damped && ledger; }  // what viscous contacts take is worked out
+};
+
+inline Uses uses_of(const Scene& s) {
+  const ContactParameters &grain = s.with(Material::grain), &wall = s.with(Material::wall);
+  const auto any = [&](auto test) { return test(grain) || (s.has_planes() && test(wall)); };
+  Uses u;
+  u.friction = any([](const ContactParameters& p) { return p.mu_s > 0 && (p.k_t > 0 || p.gamma_t > 0); });
+  u.softening = u.friction && any([](const ContactParameters& p) { return SofteningCoulomb::used(p); });
+  u.damped_grains = Viscosity::used(grain);
+  u.damped = any([](const ContactParameters& p) { return Viscosity::used(p); });
+  u.ledger = s.ledger;
+  u.water = s.exchange_interval > 0;
+  return u;
+}
+
+// Calls use.operator()<Row, account>() with the first row of CompiledLaws that has all the scene uses.
+template <class Use>
+void with_laws(const Scene& s, Use&& use) {
+  const Uses u = uses_of(s);
+  const auto covers = [&]<class L>(bool damped, Material with, L*) {
+    return L::rubs >= u.friction && L::softens >= u.softening && L::damps >= damped &&
+           MoreParts::covered_by<L>(s.with(with));
+  };
+  const auto try_row = [&]<class Row>(Row*) {
+    using Grains = typename Row::BetweenGrains;
+    using Planes = typename Row::AtPlanes;
+    if (!covers(u.damped_grains, Material::grain, static_cast<Grains*>(nullptr)) ||
+        !covers(u.damped, Material::wall, static_cast<Planes*>(nullptr)))
+      return false;
+    if (u.ledger)
+      use.template operator()<Row, Account::energy>();
+    else
+      use.template operator()<Row, Account::none>();
+    return true;
+  };
+  const bool found = [&]<class... Rows>(std::tuple<Rows...>*) {
+    return (try_row(static_cast<Rows*>(nullptr)) || ...);
+  }(static_cast<CompiledLaws*>(nullptr));
+  if (!found) throw error("internal: no row of CompiledLaws has all that the scene uses");
+}
+
+}  // namespace moraine::dem
