@@ -31,7 +31,7 @@ fluid::SolverOptions options_of(const Water& w) {
 double height_of(const Water& water, const dem::Scene& scene, const dem::State& grains,
                  const WaterState& before, bool restart) {
   if (restart) return before.height_map;
-  return has_wall(scene) ? grains.wall_z : water.height;
+  return has_wall(scene) ? grains.wall_z() : water.height;
 }
 
 class GridWater final : public PoreWater {
@@ -58,7 +58,7 @@ class GridWater final : public PoreWater {
       under_way_ = true;
     } else {
       map(s.x, grid().length[2]);
-      now_.wall_z = s.wall_z;
+      now_.wall_z = s.wall_z();
       begin(before);
     }
     stability_ = stability_of(skeleton_, water, step_.storage(), scene, s);
@@ -70,8 +70,8 @@ class GridWater final : public PoreWater {
 
   bool stale() const override { return stale_; }
 
-  void remap(const dem::GrainRow* grains, const dem::Drive& drive) override {
-    const double height = has_wall(scene_) ? drive.wall_z : grid().length[2];
+  void remap(const dem::GrainRow* grains, const dem::BodyMotion& bodies) override {
+    const double height = has_wall(scene_) ? wall_z(bodies) : grid().length[2];
     // The sum of the largest ways is longer than that of any grain.
     double moved = skeleton_.longest_way(now_.x_map, grains);
     if (has_wall(scene_)) moved += std::abs(height - now_.height_map);
@@ -95,9 +95,9 @@ class GridWater final : public PoreWater {
       mapping().displace(chunk, grains, under_way_ ? scene_.dt : 0);
   }
 
-  dem::WaterReaction solve(const dem::Drive& drive, double t) override {
+  dem::WaterReaction solve(const dem::BodyMotion& bodies, double t) override {
     const double moved = mapping().collect(u_);
-    const double wall_dz = has_wall(scene_) ? drive.wall_z - now_.wall_z : 0;
+    const double wall_dz = has_wall(scene_) ? wall_z(bodies) - now_.wall_z : 0;
     if (closed_)
       for (std::size_t f = first_at_top(); f < u_[2].size(); ++f) u_[2][f] = grid().face_area(2) * wall_dz;
 
@@ -117,7 +117,7 @@ class GridWater final : public PoreWater {
       const double force = now_.wall_pressure * scene_.area();
       out.wall = closed_ ? m * force : force, out.wall_between = closed_ ? 0 : force;
       out.work += 0.5 * (last_wall_pressure + now_.wall_pressure) * scene_.area() * wall_dz;
-      now_.wall_z = drive.wall_z;
+      now_.wall_z = wall_z(bodies);
     }
     now_.moved += moved + std::abs(wall_dz);
     stale_ = now_.moved > map_lasts * least_cell();

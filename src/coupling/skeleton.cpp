@@ -6,7 +6,7 @@
 
 #include "coupling/wall_gap.hpp"
 #include "coupling/walls.hpp"
-#include "dem/engine_parts.hpp"
+#include "dem/state_rows.hpp"
 #include "error.hpp"
 #include "memory.hpp"
 
