@@ -43,8 +43,8 @@ std::vector<WallForce> wall_forces(const Scene& scene, const State& s, const Vel
     if (!plane) continue;
     const GrainRow g = grain_at(s, w.i, at.v, at.omega);
     Spring<double> spring{w.delta_t, w.slipping};
-    const PlaneAction a = plane_action<GeneralLaw, Account::none>(scene, 0, *plane, g,
-                                                                  {g.v, 0, g.omega, 0}, spring);
+    const PlaneAction a =
+        plane_action<GeneralLaw, Account::none>(scene, 0, *plane, g, {g.v, 0, g.omega, 0}, spring);
     out.push_back({w.i, w.wall, std::abs(a.f[plane->axis]), a.f, plane->gap(g.x, g.r)});
   }
   return out;
@@ -79,8 +79,8 @@ std::vector<ContactForce> contact_forces(const Scene& scene, const State& s) {
     const Geometry<double> g = between_grains(x_ij, s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]);
     const Motion<double> motion{at.v[c.i] - at.v[c.j], at.omega[c.i], at.omega[c.j]};
     Spring<double> spring{c.delta_t, c.slipping};
-    const Action<double> a = contact_law<GeneralLaw, Account::none>(scene.with(Material::grain), 0, g, motion,
-                                                                    motion, spring);
+    const Action<double> a =
+        contact_law<GeneralLaw, Account::none>(scene.with(Material::grain), 0, g, motion, motion, spring);
     const Vec3d f_n = dot(a.f, g.n) * g.n;
     out.push_back({c.i, c.j, s.x[c.i] - g.l_i * g.n, f_n, a.f - f_n, -g.delta_n});
   }
@@ -185,14 +185,15 @@ Observation observe(const Scene& scene, const State& s, const Loads& loads) {
     return GeneralLaw::Friction::stored(p, delta_t);
   };
   const ContactParameters& grain = scene.with(Material::grain);
-  const auto at_plane = [&](BodyId id) -> const ContactParameters& {
+  const auto of_plane = [&](BodyId id) -> const ContactParameters& {
     return scene.with(scene.body(id).material);
   };
   for (const ContactForce& c : contacts) e.elastic_normal += GeneralLaw::stored_normal(grain, c.overlap);
   for (const Contact& c : s.contacts) e.elastic_tangential += stored_along(grain, c.delta_t);
-  for (const WallForce& w : walls) e.elastic_normal += GeneralLaw::stored_normal(at_plane(w.wall), -w.delta_n);
+  for (const WallForce& w : walls)
+    e.elastic_normal += GeneralLaw::stored_normal(of_plane(w.wall), -w.delta_n);
   for (const WallContact& w : s.wall_contacts)
-    if (scene.has(w.wall)) e.elastic_tangential += stored_along(at_plane(w.wall), w.delta_t);
+    if (scene.has(w.wall)) e.elastic_tangential += stored_along(of_plane(w.wall), w.delta_t);
 
   double net = 0;
   Index free = 0;

@@ -40,14 +40,10 @@ constexpr std::tuple members<dem::Drive>{
 
 template <>
 constexpr std::tuple members<dem::Body>{
-    Member{"shape", &dem::Body::shape},
-    Member{"axis", &dem::Body::axis},
-    Member{"facing", &dem::Body::facing},
-    Member{"place", &dem::Body::place},
-    Member{"mass", &dem::Body::mass},
-    Member{"material", &dem::Body::material},
-    Member{"x", &dem::Body::x},
-    Member{"y", &dem::Body::y},
+    Member{"shape", &dem::Body::shape},   Member{"axis", &dem::Body::axis},
+    Member{"facing", &dem::Body::facing}, Member{"place", &dem::Body::place},
+    Member{"mass", &dem::Body::mass},     Member{"material", &dem::Body::material},
+    Member{"x", &dem::Body::x},           Member{"y", &dem::Body::y},
     Member{"z", &dem::Body::z},
 };
 
@@ -268,7 +264,9 @@ constexpr std::size_t member_count() {
 
 // Parameters of contacts list themselves (law/parameters.hpp): those of a new part need nothing here.
 template <class T>
-concept ListsItself = requires { T::list(); };
+concept ListsItself = requires {
+  T::list();
+};
 
 template <class T>
 constexpr bool is_stored_struct = [] {
