@@ -255,7 +255,8 @@ Case load_checked(const fs::path& directory, const std::vector<Override>& overri
     add_default(key, draft.entries, context);
     if (key.set) key.set(key, c, no_stage, draft.entries.at(key.name).value);
   }
-  for (double* k : {&c.k_n, &c.k_t, &c.wall_k_t}) *k /= c.softening;
+  for (double* k : {&c.contact.k_n, &c.contact.k_t, &c.wall.k_t}) *k /= c.softening;
+  c.wall.k_n = c.contact.k_n;
   check_case(draft.entries);
   c.start = start_file(directory, draft.entries.at("start"));
 

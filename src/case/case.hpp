@@ -111,10 +111,11 @@ struct Case {
   bool periodic_x, periodic_y, periodic_z;
   bool floor;
   Grains grains;
-  std::string preset;       // "none", or what filled f, softening and wall viscosity
-  double softening;         // what the stiffnesses below have been divided by
-  double k_n, k_t;          // N/m
-  double wall_k_t;          // N/m
+  std::string preset;  // "none", or what filled f, softening and wall viscosity
+  double softening;    // what the stiffnesses below have been divided by
+  // What contact.* and wall.* say (k_n of walls is that of contacts); stages have their own damping and
+  // friction.
+  dem::ContactParameters contact, wall;
   double wall_mass;         // kg; 0: 0.001 of the mass of N spheres as wide as a lattice cell
   double gravity;           // m/s2
   double dt;                // s; 0: by eq. 9

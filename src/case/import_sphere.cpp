@@ -139,8 +139,11 @@ Bed read_bed(const fs::path& path) {
   in.expect(k.x > 0 && k.y >= 0 && p[10] > 0 && finite(k) &&
                 std::all_of(p.begin(), p.end(), [](double q) { return q >= 0 && std::isfinite(q); }),
             "k_n = ", k.x, " N/m, k_t = ", k.y, " N/m, density = ", p[10], " kg/m3, or a negative parameter");
-  scene.grain = {k.x, k.y, p[0], p[1], p[3], p[4]};
-  scene.wall = {k.x, 0, p[6], p[7], p[9], p[9]};  // viscous below the dynamic limit, no spring
+  dem::ContactParameters &grain = scene.with(dem::Material::grain), &wall = scene.with(dem::Material::wall);
+  grain.k_n = k.x, grain.k_t = k.y, grain.gamma_n = p[0], grain.gamma_t = p[1];
+  grain.mu_s = p[3], grain.mu_d = p[4];
+  wall.k_n = k.x, wall.k_t = 0, wall.gamma_n = p[6], wall.gamma_t = p[7];
+  wall.mu_s = wall.mu_d = p[9];  // viscous below the dynamic limit, no spring
   scene.density = p[10];
 
   s.id.resize(n);
@@ -148,13 +151,14 @@ Bed read_bed(const fs::path& path) {
   s.force.assign(n, {0, 0, 0});
   s.torque.assign(n, {0, 0, 0});
   s.x_start = s.x;
-  s.role.assign(n, dem::Role::free);
-  for (std::uint32_t i = 0; i < n; ++i) s.wall_z = std::max(s.wall_z, s.x[i].z + s.r[i]);
+  s.part_of.assign(n, dem::BodyId::none);
+  for (std::uint32_t i = 0; i < n; ++i) s.wall_z() = std::max(s.wall_z(), s.x[i].z + s.r[i]);
   return bed;
 }
 
 std::string case_text(const Bed& bed, const std::string& file) {
-  const auto& [k_n, k_t, gamma_n, gamma_t, mu_s, mu_d] = bed.scene.grain;
+  const dem::ContactParameters &grain = bed.scene.with(dem::Material::grain),
+                               &wall = bed.scene.with(dem::Material::wall);
   std::ostringstream text;
   const auto line = [&](const char* key, const Value& value) {
     text << key << " = " << to_toml(value) << "\n";
@@ -168,22 +172,23 @@ std::string case_text(const Bed& bed, const std::string& file) {
   text << "\n[grains]\n";
   line("density", bed.scene.density);
   text << "\n[contact]\n";
-  line("k_n", k_n), line("k_t", k_t), line("gamma_n", gamma_n), line("gamma_t", gamma_t);
-  line("mu_s", mu_s), line("mu_d", mu_d);
+  line("k_n", grain.k_n), line("k_t", grain.k_t);
+  line("gamma_n", grain.gamma_n), line("gamma_t", grain.gamma_t);
+  line("mu_s", grain.mu_s), line("mu_d", grain.mu_d);
   text << "\n[model]\n";
   line("gravity", bed.scene.gravity);
   text << "\n[[stage]]\nname = \"consolidate\"\nkind = \"consolidate\"\nnormal_stress = \"10 kPa\"\nduration "
           "= \"0.1 s\"\n";
   // Damping beyond the critical one makes explicit steps chatter: the run would be refused.
   const double r_min = *std::min_element(bed.state.r.begin(), bed.state.r.end());
-  const double critical = 2 * std::sqrt(k_n * dem::sphere_mass(bed.scene.density, r_min));
+  const double critical = 2 * std::sqrt(grain.k_n * dem::sphere_mass(bed.scene.density, r_min));
   const auto damping = [&](const char* key, double of_file) {
     line(key, std::min(of_file, critical));
     if (of_file > critical)
       text << "# the file has " << of_file << ", above critical damping of its smallest grain\n";
   };
-  damping("wall_gamma_n", bed.scene.wall.gamma_n), damping("wall_gamma_t", bed.scene.wall.gamma_t);
-  line("wall_mu", bed.scene.wall.mu_d);
+  damping("wall_gamma_n", wall.gamma_n), damping("wall_gamma_t", wall.gamma_t);
+  line("wall_mu", wall.mu_d);
   text << "\n[[stage]]\nname = \"shear\"\nkind = \"shear\"\nnormal_stress = \"10 kPa\"\nstrain_rate = \"0.05 "
           "1/s\"\n"
           "strain = 0.02\n";

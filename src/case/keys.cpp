@@ -107,6 +107,9 @@ std::vector<Key> make_keys() {
   constexpr auto guards = &C::guards;
   using F = Fluid;
   constexpr auto fluid = &C::fluid;
+  using P = dem::ContactParameters;
+  constexpr auto contact = &C::contact;
+  constexpr auto wall = &C::wall;
   const string sheared = "shear, shear_stress", damped = "; settle, consolidate: ";
   std::vector<Key> table{
       // clang-format off
@@ -133,17 +136,17 @@ std::vector<Key> make_keys() {
       row<grains, &G::columns_y>("grains.columns_y", "", "10", ">= 1", "lattice cells along y"),
       row<grains, &G::cell>("grains.cell", "1", "2.1", ">= 1.05", "side of a lattice cell in largest grain diameters"),
 
-      row<&C::k_n>("contact.k_n", "N/m", "1.16e9", "> 0", "normal stiffness"),
-      row<&C::k_t>("contact.k_t", "N/m", "1.16e9", ">= 0", "tangential stiffness"),
-      {"contact.gamma_n", Type::number, "N s/m", "0", ">= 0", "normal viscosity; a stage may have its own", "", set_nothing},
-      {"contact.gamma_t", Type::number, "N s/m", "0", ">= 0", "tangential viscosity; a stage may have its own", "", set_nothing},
-      {"contact.mu_s", Type::number, "1", "0.3", ">= 0", "static friction; a stage may have its own", "", set_nothing},
-      {"contact.mu_d", Type::number, "1", "contact.mu_s", ">= 0", "dynamic friction, at most mu_s; a stage may have its own", "", set_nothing},
+      row<contact, &P::k_n>("contact.k_n", "N/m", "1.16e9", "> 0", "normal stiffness"),
+      row<contact, &P::k_t>("contact.k_t", "N/m", "1.16e9", ">= 0", "tangential stiffness"),
+      row<contact, &P::gamma_n>("contact.gamma_n", "N s/m", "0", ">= 0", "normal viscosity; a stage may have its own"),
+      row<contact, &P::gamma_t>("contact.gamma_t", "N s/m", "0", ">= 0", "tangential viscosity; a stage may have its own"),
+      row<contact, &P::mu_s>("contact.mu_s", "1", "0.3", ">= 0", "static friction; a stage may have its own"),
+      row<contact, &P::mu_d>("contact.mu_d", "1", "contact.mu_s", ">= 0", "dynamic friction, at most mu_s; a stage may have its own"),
 
-      row<&C::wall_k_t>("wall.k_t", "N/m", "0", ">= 0", "tangential stiffness against walls; k_n is that of contacts"),
+      row<wall, &P::k_t>("wall.k_t", "N/m", "0", ">= 0", "tangential stiffness against walls; k_n is that of contacts"),
       row<&C::wall_mass>("wall.mass", "kg", "0", ">= 0", "of the top wall; 0: 0.001 of the mass of N spheres as wide as a lattice cell"),
-      {"wall.gamma_n", Type::number, "N s/m", "1e4", ">= 0", "normal viscosity against walls while settling and consolidating; a stage may have its own", "", set_nothing},
-      {"wall.gamma_t", Type::number, "N s/m", "1e4", ">= 0", "tangential viscosity against walls, likewise", "", set_nothing},
+      row<wall, &P::gamma_n>("wall.gamma_n", "N s/m", "1e4", ">= 0", "normal viscosity against walls while settling and consolidating; a stage may have its own"),
+      row<wall, &P::gamma_t>("wall.gamma_t", "N s/m", "1e4", ">= 0", "tangential viscosity against walls, likewise"),
 
       row<&C::gravity>("model.gravity", "m/s2", "9.80665", ">= 0", "along -z"),
       row<&C::preset>("model.preset", "", "\"none\"", "none | paper | standard | fast", "accuracy against time: sets f, softening and the walls' viscosity where the case does not; see below"),

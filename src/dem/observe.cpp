@@ -2,15 +2,12 @@
 
 #include <algorithm>
 
-#include "dem/engine_parts.hpp"
-#include "dem/features.hpp"
+#include "dem/body/plane_contact.hpp"
+#include "dem/state_rows.hpp"
 
 namespace moraine::dem {
 
 namespace {
-
-// The force of a contact as the law gives it, springs left as they are.
-constexpr Features all_features{true, true, true, false};
 
 GrainRow grain_at(const State& s, Index i, const std::vector<Vec3d>& v, const std::vector<Vec3d>& omega) {
   return {s.x[i], s.r[i], v[i], s.r[i], omega[i], 0, {0, 0, 0}, 0};
@@ -23,29 +20,32 @@ Velocities at_step(const Scene& scene, const State& s) {
   Velocities w{s.v, s.omega};
   if (!s.staggered) return w;
   for (Index i = 0; i < s.size(); ++i) {
-    const Mobility m = mobility(scene, s.r[i], s.role[i]);
+    const Mobility m = mobility(scene, s.r[i], s.part_of[i]);
     w.v[i] = axpy(0.5 * scene.dt, m.acceleration(kick(scene, s, i)), s.v[i]);
     w.omega[i] = axpy(0.5 * scene.dt, m.spin_acceleration(s.torque[i]), s.omega[i]);
   }
-  if (scene.shear.drive == Shear::Drive::stress) {
-    const double u = drive_of(scene, s).layer_u_now;
+  const BodyMotion bodies = motion_of(scene, s);
+  for (int k = 0; k < bodies.servos; ++k) {
+    const Servo& layer = bodies.servo[k];
+    if (layer.is_plane() || !layer.by_stress()) continue;
     for (Index i = 0; i < s.size(); ++i)
-      if (s.role[i] == Role::top) w.v[i].x = u;
+      if (s.part_of[i] == layer.body) w.v[i][layer.axis] = layer.v_now;
   }
   return w;
 }
 
+// Springs are left as they are, here and in contact_forces. A plane that is gone bears nothing.
 std::vector<WallForce> wall_forces(const Scene& scene, const State& s, const Velocities& at) {
   std::vector<WallForce> out;
-  const Drive drive = drive_of(scene, s);
+  const BodyMotion bodies = motion_of(scene, s);
   for (const WallContact& w : s.wall_contacts) {
+    const Plane* plane = bodies.find(w.wall);
+    if (!plane) continue;
     const GrainRow g = grain_at(s, w.i, at.v, at.omega);
     Spring<double> spring{w.delta_t, w.slipping};
-    const WallAction a =
-        wall_action<all_features>(scene.wall, 0, drive, g, {g.v, 0, g.omega, 0}, w.wall, spring);
-    const bool top = w.wall == WallName::top;
-    out.push_back({w.i, w.wall, std::abs(a.f.z), a.f,
-                   at_wall(g.x.z, g.r, top ? drive.wall_z : 0.0, top ? -1.0 : 1.0).delta_n});
+    const PlaneAction a =
+        plane_action<GeneralLaw, Account::none>(scene, 0, *plane, g, {g.v, 0, g.omega, 0}, spring);
+    out.push_back({w.i, w.wall, std::abs(a.f[plane->axis]), a.f, plane->gap(g.x, g.r)});
   }
   return out;
 }
@@ -79,7 +79,8 @@ std::vector<ContactForce> contact_forces(const Scene& scene, const State& s) {
     const Geometry<double> g = between_grains(x_ij, s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]);
     const Motion<double> motion{at.v[c.i] - at.v[c.j], at.omega[c.i], at.omega[c.j]};
     Spring<double> spring{c.delta_t, c.slipping};
-    const Action<double> a = contact_law<all_features>(scene.grain, 0, g, motion, motion, spring);
+    const Action<double> a =
+        contact_law<GeneralLaw, Account::none>(scene.with(Material::grain), 0, g, motion, motion, spring);
     const Vec3d f_n = dot(a.f, g.n) * g.n;
     out.push_back({c.i, c.j, s.x[c.i] - g.l_i * g.n, f_n, a.f - f_n, -g.delta_n});
   }
@@ -90,15 +91,15 @@ void mark_slipping(const Scene& scene, State& s) {
   constexpr double rounding = 1e-12;  // of the force that slip leaves
   const std::vector<ContactForce> forces = contact_forces(scene, s);
   for (std::size_t k = 0; k < forces.size(); ++k) {
-    const double limit = (1 - rounding) * scene.grain.mu_d;
+    const double limit = (1 - rounding) * scene.with(Material::grain).mu_d;
     const double f_t2 = dot(forces[k].f_t, forces[k].f_t), f_n2 = dot(forces[k].f_n, forces[k].f_n);
     s.contacts[k].slipping = f_t2 > 0 && f_t2 >= limit * limit * f_n2 ? 1 : 0;
   }
 }
 
 Loads loads_of(const Scene& scene, const State& s) {
-  return {contact_forces(scene, s), wall_forces(scene, s, at_step(scene, s)), s.force, s.wall_force,
-          s.shear_force};
+  return {contact_forces(scene, s), wall_forces(scene, s, at_step(scene, s)), s.force,
+          s.at(BodyId::top_wall).force.z, s.at(BodyId::top_layer).force.x};
 }
 
 void add(Loads& sum, const Loads& next) {
@@ -140,17 +141,17 @@ Observation observe(const Scene& scene, const State& s) { return observe(scene, 
 Observation observe(const Scene& scene, const State& s, const Loads& loads) {
   Observation o;
   const double area = scene.area();
-  const bool has_wall = scene.top_wall.drive != TopWall::Drive::none;
+  const bool has_wall = scene.has(BodyId::top_wall);
   const Velocities at = at_step(scene, s);
   const std::vector<ContactForce> contacts = contact_forces(scene, s);
   const std::vector<WallForce> walls = wall_forces(scene, s, at);
 
   double floor_force = 0;
   for (const WallForce& w : loads.walls)
-    if (w.wall == WallName::floor) floor_force += w.f.z;
+    if (w.wall == BodyId::floor) floor_force += w.f.z;
   double water_on_layer = 0;
   for (Index i = 0; i < static_cast<Index>(s.water_force.size()); ++i)
-    if (s.role[i] == Role::top) water_on_layer += s.water_force[i].x;
+    if (s.part_of[i] == BodyId::top_layer) water_on_layer += s.water_force[i].x;
   o.shear_stress = -(loads.shear_force + water_on_layer) / area;
   o.normal_stress = (has_wall ? loads.wall_force : floor_force) / area;
 
@@ -163,7 +164,7 @@ Observation observe(const Scene& scene, const State& s, const Loads& loads) {
     if (inside(s.x[i])) volume += sphere_volume(s.r[i]);
     o.height = std::max(o.height, s.x[i].z + s.r[i]);
   }
-  if (has_wall) o.height = s.wall_z;
+  if (has_wall) o.height = s.wall_z();
   o.porosity = 1 - volume / (area * (scene.periodic_z ? scene.box.z : o.height));
 
   double normal_force = 0;
@@ -180,17 +181,24 @@ Observation observe(const Scene& scene, const State& s, const Loads& loads) {
   }
 
   Energy& e = o.energy;
-  for (const ContactForce& c : contacts) e.elastic_normal += 0.5 * scene.grain.k_n * c.overlap * c.overlap;
-  for (const Contact& c : s.contacts)
-    e.elastic_tangential += 0.5 * scene.grain.k_t * dot(c.delta_t, c.delta_t);
-  for (const WallForce& w : walls) e.elastic_normal += 0.5 * scene.wall.k_n * w.delta_n * w.delta_n;
+  const auto stored_along = [](const ContactParameters& p, const Vec3d& delta_t) {
+    return GeneralLaw::Friction::stored(p, delta_t);
+  };
+  const ContactParameters& grain = scene.with(Material::grain);
+  const auto of_plane = [&](BodyId id) -> const ContactParameters& {
+    return scene.with(scene.body(id).material);
+  };
+  for (const ContactForce& c : contacts) e.elastic_normal += GeneralLaw::stored_normal(grain, c.overlap);
+  for (const Contact& c : s.contacts) e.elastic_tangential += stored_along(grain, c.delta_t);
+  for (const WallForce& w : walls)
+    e.elastic_normal += GeneralLaw::stored_normal(of_plane(w.wall), -w.delta_n);
   for (const WallContact& w : s.wall_contacts)
-    e.elastic_tangential += 0.5 * scene.wall.k_t * dot(w.delta_t, w.delta_t);
+    if (scene.has(w.wall)) e.elastic_tangential += stored_along(of_plane(w.wall), w.delta_t);
 
   double net = 0;
   Index free = 0;
   for (Index i = 0; i < s.size(); ++i) {
-    const Mobility mob = mobility(scene, s.r[i], s.role[i]);
+    const Mobility mob = mobility(scene, s.r[i], s.part_of[i]);
     const double m = sphere_mass(scene.density, s.r[i]), inertia = 0.4 * m * s.r[i] * s.r[i];
     // 1/2 m v(n-1/2).v(n+1/2)
     const auto before_times_after = [](const Vec3d& before, const Vec3d& at) {
@@ -198,7 +206,7 @@ Observation observe(const Scene& scene, const State& s, const Loads& loads) {
     };
     e.kinetic += 0.5 * m * before_times_after(s.v[i], at.v[i]);
     e.rotational += 0.5 * inertia * before_times_after(s.omega[i], at.omega[i]);
-    if (s.role[i] != Role::free) continue;
+    if (s.part_of[i] != BodyId::none) continue;
     e.potential += m * scene.submerged_gravity() * s.x[i].z;
     const Vec3d a =
         mob.acceleration(s.water_force.empty() ? loads.force[i] : loads.force[i] + s.water_force[i]);
@@ -206,9 +214,12 @@ Observation observe(const Scene& scene, const State& s, const Loads& loads) {
     ++free;
   }
   if (free > 0 && normal_force > 0) o.unbalanced_force = net / free / normal_force;
-  if (scene.top_wall.drive == TopWall::Drive::stress) {
-    const double half = s.staggered ? 0.5 * scene.dt * drive_of(scene, s).wall_acceleration(scene) : 0;
-    e.wall_kinetic = 0.5 * scene.top_wall.mass * s.wall_v * (s.wall_v + 2 * half);
+  const BodyMotion bodies = motion_of(scene, s);
+  for (int k = 0; k < bodies.servos; ++k) {
+    const Servo& plane = bodies.servo[k];
+    if (!plane.is_plane() || !plane.by_stress()) continue;
+    const double half = s.staggered ? 0.5 * scene.dt * plane.acceleration(area) : 0;
+    e.wall_kinetic += 0.5 * plane.mass * plane.v * (plane.v + 2 * half);
   }
   return o;
 }

@@ -30,7 +30,7 @@ struct ContactForce {
 };
 struct WallForce {
   Index i;
-  WallName wall;
+  BodyId wall;
   double f_n;      // N
   Vec3d f;         // N, on the grain
   double delta_n;  // m

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "dem/grain.hpp"
+#include "dem/sums.hpp"
 
 namespace moraine::dem {
 

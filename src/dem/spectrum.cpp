@@ -1,9 +1,11 @@
 #include "dem/spectrum.hpp"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 
-#include "dem/engine_parts.hpp"
+#include "dem/body/motion.hpp"
+#include "dem/leapfrog.hpp"
 
 namespace moraine::dem {
 
@@ -27,6 +29,13 @@ struct Resistance {
 Resistance springs(const ContactParameters& p) { return {p.k_n, p.mu_s > 0 ? p.k_t : 0}; }
 Resistance dashpots(const ContactParameters& p) { return {p.gamma_n, p.mu_s > 0 ? p.gamma_t : 0}; }
 
+using Resistances = std::array<Resistance, materials>;  // by what the grain touches
+Resistances of_contacts(const Scene& scene, Resistance of(const ContactParameters&)) {
+  Resistances all;
+  for (int m = 0; m < materials; ++m) all[m] = of(scene.contact[m]);
+  return all;
+}
+
 // v -> M^-1/2 K M^-1/2 v, contact by contact. Held directions have an infinite mass.
 class Network {
  public:
@@ -41,26 +50,29 @@ class Network {
       root_.push_back({spin, spin, spin});
       if (s.part_of[i] == BodyId::top_layer) layer_mass += sphere_mass(scene.density, s.r[i]);
     }
-    if (scene.top_wall.drive == TopWall::Drive::stress) wall_root_ = root(1 / scene.top_wall.mass);
-    if (scene.shear.drive == Shear::Drive::stress && layer_mass > 0) layer_root_ = root(1 / layer_mass);
+    const Body &wall = scene.body(BodyId::top_wall), &layer = scene.body(BodyId::top_layer);
+    if (wall.z.kind == Drive::Kind::stress) wall_root_ = root(1 / wall.mass);
+    if (layer.x.kind == Drive::Kind::stress && layer_mass > 0) layer_root_ = root(1 / layer_mass);
 
     const Sides sides = Sides::of(scene);
     for (const Contact& c : s.contacts)
-      bonds_.push_back({c.i, c.j, false,
+      bonds_.push_back({c.i, c.j, Material::grain, false,
                         between_grains(nearest_image(sides, s.x[c.i] - s.x[c.j]), s.r[c.i] + s.r[c.j],
                                        s.r[c.i] - s.r[c.j])});
     for (const WallContact& w : s.wall_contacts) {
-      const bool top = w.wall == WallName::top;
-      const Geometry<double> g = at_wall(s.x[w.i].z, s.r[w.i], top ? s.wall_z : 0, top ? -1 : 1);
-      bonds_.push_back({w.i, top ? n_ : -1, true, g});
+      const Body& plane = scene.body(w.wall);
+      if (!plane.is_there()) continue;
+      const Geometry<double> g =
+          at_plane(s.x[w.i], s.r[w.i], plane.axis, place_of(scene, s, w.wall), plane.facing);
+      bonds_.push_back({w.i, w.wall == BodyId::top_wall ? n_ : -1, plane.material, true, g});
     }
   }
 
   std::size_t freedoms() const { return freedoms_; }
   bool empty() const { return bonds_.empty(); }
 
-  // y = A v, for `grain` between grains and `wall` at walls.
-  void apply(const Resistance& grain, const Resistance& wall, const Vector& v, Vector& y) {
+  // y = A v
+  void apply(const Resistances& resistances, const Vector& v, Vector& y) {
     for (Index k = 0; k < 2 * n_; ++k)
       for (int a = 0; a < 3; ++a) motion_[k][a] = root_[k][a] * v[3 * k + a];
     const double layer = layer_root_ * v[6 * n_ + 1];
@@ -71,7 +83,7 @@ class Network {
 
     std::vector<Vec3d>& load = load_;
     load.assign(motion_.size(), Vec3d{0, 0, 0});
-    for (const Bond& b : bonds_) resist(b, b.at_wall ? wall : grain, load);
+    for (const Bond& b : bonds_) resist(b, resistances[static_cast<std::size_t>(b.material)], load);
 
     double layer_force = 0;
     for (Index i = 0; i < n_; ++i)
@@ -84,8 +96,9 @@ class Network {
 
  private:
   struct Bond {
-    Index i, j;  // j = n_: top wall, -1: floor
-    bool at_wall;
+    Index i, j;  // j = n_: top wall, -1: a plane that stands still
+    Material material;
+    bool at_plane;
     Geometry<double> g;
   };
 
@@ -93,7 +106,7 @@ class Network {
   void resist(const Bond& b, const Resistance& k, std::vector<Vec3d>& load) const {
     const Geometry<double>& g = b.g;
     const Vec3d still{0, 0, 0};
-    const Vec3d v_j = b.j < 0 ? still : motion_[2 * b.j], omega_j = b.at_wall ? still : motion_[2 * b.j + 1];
+    const Vec3d v_j = b.j < 0 ? still : motion_[2 * b.j], omega_j = b.at_plane ? still : motion_[2 * b.j + 1];
     const Vec3d v = motion_[2 * b.i] - v_j;
     const Vec3d v_c = v + cross(g.n, axpy(g.l_i, motion_[2 * b.i + 1], g.l_j * omega_j));
     const Vec3d f_t = k.tangential * less(v_c, dot(v_c, g.n), g.n);
@@ -101,7 +114,7 @@ class Network {
     load[2 * b.i] += f;
     load[2 * b.i + 1] -= g.l_i * moment;
     if (b.j >= 0) load[2 * b.j] -= f;
-    if (!b.at_wall) load[2 * b.j + 1] -= g.l_j * moment;
+    if (!b.at_plane) load[2 * b.j + 1] -= g.l_j * moment;
   }
 
   Index n_;
@@ -159,9 +172,9 @@ Vector start_vector(std::size_t size) {
 
 // Largest eigenvalue plus the residual of its vector. Without reorthogonalisation: that repeats eigenvalues
 // and invents none.
-double largest_eigenvalue(Network& network, const Resistance& grain, const Resistance& wall) {
+double largest_eigenvalue(Network& network, const Resistances& resistances) {
   if (network.empty()) return 0;
-  const auto apply = [&](const Vector& v, Vector& y) { network.apply(grain, wall, v, y); };
+  const auto apply = [&](const Vector& v, Vector& y) { network.apply(resistances, v, y); };
   Vector v, before(network.freedoms(), 0), next(network.freedoms());
   apply(start_vector(network.freedoms()), next);  // leaves the part that no contact resists behind
   v = next;
@@ -200,11 +213,12 @@ double critical_step(const ContactParameters& p, double inverse_mass, double inv
 
 Spectrum spectrum(const Scene& scene, const State& state) {
   Network network(scene, state);
-  const Resistance c_grain = dashpots(scene.grain), c_wall = dashpots(scene.wall);
+  const Resistances damping = of_contacts(scene, dashpots);
   Spectrum s;
-  s.stiffness = largest_eigenvalue(network, springs(scene.grain), springs(scene.wall));
-  if (c_grain.normal + c_grain.tangential + c_wall.normal + c_wall.tangential > 0)
-    s.damping = largest_eigenvalue(network, c_grain, c_wall);
+  s.stiffness = largest_eigenvalue(network, of_contacts(scene, springs));
+  if (std::any_of(damping.begin(), damping.end(),
+                  [](const Resistance& c) { return c.normal > 0 || c.tangential > 0; }))
+    s.damping = largest_eigenvalue(network, damping);
   return s;
 }
 
@@ -216,11 +230,12 @@ double critical_step(const Spectrum& s) {
 double one_contact_step(const Scene& scene, const State& s) {
   const double m = sphere_mass(scene.density, *std::min_element(s.r.begin(), s.r.end()));
   const double turning = 2.5;  // m r^2/I of a sphere
-  double step = critical_step(scene.grain, 2 / m, 2 * turning / m);
-  if (scene.floor) step = std::min(step, critical_step(scene.wall, 1 / m, turning / m));
-  if (scene.top_wall.drive != TopWall::Drive::none) {
-    const double wall = scene.top_wall.drive == TopWall::Drive::stress ? 1 / scene.top_wall.mass : 0;
-    step = std::min(step, critical_step(scene.wall, 1 / m + wall, turning / m));
+  double step = critical_step(scene.with(Material::grain), 2 / m, 2 * turning / m);
+  for (const BodyId id : planes) {
+    const Body& plane = scene.body(id);
+    if (!plane.is_there()) continue;
+    const double inverse_mass = plane.along(plane.axis).kind == Drive::Kind::stress ? 1 / plane.mass : 0;
+    step = std::min(step, critical_step(scene.with(plane.material), 1 / m + inverse_mass, turning / m));
   }
   return step;
 }

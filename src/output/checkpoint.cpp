@@ -2,6 +2,7 @@
 // structs are groups. Units and meanings are those of scene.hpp and state.hpp.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <tuple>
 
 #include "error.hpp"
@@ -17,7 +18,7 @@ inline constexpr bool hdf5::all_doubles<Row> = true;
 namespace {
 
 constexpr const char* kind = "checkpoint";
-constexpr std::int64_t format = 5;  // raise it with every change to a struct below
+constexpr std::int64_t format = 6;  // raise it with every change to a struct below
 
 // Every member of every stored struct, once, for writing and for reading. A new member is one more line; one
 // that is forgotten does not compile.
@@ -31,26 +32,19 @@ template <class T>
 constexpr std::tuple<> members{};
 
 template <>
-constexpr std::tuple members<dem::ContactParameters>{
-    Member{"k_n", &dem::ContactParameters::k_n},         Member{"k_t", &dem::ContactParameters::k_t},
-    Member{"gamma_n", &dem::ContactParameters::gamma_n}, Member{"gamma_t", &dem::ContactParameters::gamma_t},
-    Member{"mu_s", &dem::ContactParameters::mu_s},       Member{"mu_d", &dem::ContactParameters::mu_d},
+constexpr std::tuple members<dem::Drive>{
+    Member{"kind", &dem::Drive::kind},           Member{"velocity", &dem::Drive::velocity},
+    Member{"mean", &dem::Drive::mean},           Member{"amplitude", &dem::Drive::amplitude},
+    Member{"frequency", &dem::Drive::frequency}, Member{"phase", &dem::Drive::phase},
 };
 
 template <>
-constexpr std::tuple members<dem::TopWall>{
-    Member{"drive", &dem::TopWall::drive},         Member{"mass", &dem::TopWall::mass},
-    Member{"sigma_0", &dem::TopWall::sigma_0},     Member{"amplitude", &dem::TopWall::amplitude},
-    Member{"frequency", &dem::TopWall::frequency}, Member{"phase", &dem::TopWall::phase},
-    Member{"velocity", &dem::TopWall::velocity},
-};
-
-template <>
-constexpr std::tuple members<dem::Shear>{
-    Member{"drive", &dem::Shear::drive},
-    Member{"velocity", &dem::Shear::velocity},
-    Member{"stress", &dem::Shear::stress},
-    Member{"hold_z", &dem::Shear::hold_z},
+constexpr std::tuple members<dem::Body>{
+    Member{"shape", &dem::Body::shape},   Member{"axis", &dem::Body::axis},
+    Member{"facing", &dem::Body::facing}, Member{"place", &dem::Body::place},
+    Member{"mass", &dem::Body::mass},     Member{"material", &dem::Body::material},
+    Member{"x", &dem::Body::x},           Member{"y", &dem::Body::y},
+    Member{"z", &dem::Body::z},
 };
 
 template <>
@@ -59,7 +53,6 @@ constexpr std::tuple members<dem::Scene>{
     Member{"periodic_x", &dem::Scene::periodic_x},
     Member{"periodic_y", &dem::Scene::periodic_y},
     Member{"periodic_z", &dem::Scene::periodic_z},
-    Member{"floor", &dem::Scene::floor},
     Member{"gravity", &dem::Scene::gravity},
     Member{"density", &dem::Scene::density},
     Member{"fluid_density", &dem::Scene::fluid_density},
@@ -67,10 +60,8 @@ constexpr std::tuple members<dem::Scene>{
     Member{"dt", &dem::Scene::dt},
     Member{"time_0", &dem::Scene::time_0},
     Member{"step_0", &dem::Scene::step_0},
-    Member{"grain", &dem::Scene::grain},
-    Member{"wall", &dem::Scene::wall},
-    Member{"top_wall", &dem::Scene::top_wall},
-    Member{"shear", &dem::Scene::shear},
+    Member{"contact", &dem::Scene::contact},
+    Member{"bodies", &dem::Scene::bodies},
     Member{"neighbour_margin", &dem::Scene::neighbour_margin},
     Member{"ledger", &dem::Scene::ledger},
 };
@@ -110,6 +101,13 @@ constexpr std::tuple members<dem::WaterReaction>{
 };
 
 template <>
+constexpr std::tuple members<dem::BodyState>{
+    Member{"x", &dem::BodyState::x},
+    Member{"v", &dem::BodyState::v},
+    Member{"force", &dem::BodyState::force},
+};
+
+template <>
 constexpr std::tuple members<dem::State>{
     Member{"id", &dem::State::id},
     Member{"r", &dem::State::r},
@@ -121,15 +119,11 @@ constexpr std::tuple members<dem::State>{
     Member{"torque", &dem::State::torque},
     Member{"water_force", &dem::State::water_force},
     Member{"x_start", &dem::State::x_start},
-    Member{"role", &dem::State::role},
+    Member{"part_of", &dem::State::part_of},
     Member{"contacts", &dem::State::contacts},
     Member{"wall_contacts", &dem::State::wall_contacts},
-    Member{"wall_z", &dem::State::wall_z},
-    Member{"wall_v", &dem::State::wall_v},
-    Member{"wall_force", &dem::State::wall_force},
-    Member{"shear_force", &dem::State::shear_force},
+    Member{"bodies", &dem::State::bodies},
     Member{"water", &dem::State::water},
-    Member{"layer_u", &dem::State::layer_u},
     Member{"ledger", &dem::State::ledger},
     Member{"step", &dem::State::step},
     Member{"staggered", &dem::State::staggered},
@@ -227,13 +221,15 @@ constexpr std::tuple members<Checkpoint>{
 template <class E>
 constexpr E last = E{};
 template <>
-constexpr auto last<dem::TopWall::Drive> = dem::TopWall::Drive::velocity;
+constexpr auto last<dem::BodyId> = dem::BodyId::y_high;
+static_assert(static_cast<int>(last<dem::BodyId>) + 1 == dem::body_ids);
 template <>
-constexpr auto last<dem::Shear::Drive> = dem::Shear::Drive::stress;
+constexpr auto last<dem::Body::Shape> = dem::Body::Shape::layer;
 template <>
-constexpr auto last<dem::Role> = dem::Role::top;
+constexpr auto last<dem::Drive::Kind> = dem::Drive::Kind::free;
 template <>
-constexpr auto last<dem::WallName> = dem::WallName::top;
+constexpr auto last<dem::Material> = dem::Material::wall;
+static_assert(static_cast<int>(last<dem::Material>) + 1 == dem::materials);
 template <>
 constexpr auto last<fluid::Side::Kind> = fluid::Side::Kind::flux;
 template <>
@@ -266,17 +262,32 @@ constexpr std::size_t member_count() {
   }
 }
 
+// Parameters of contacts list themselves (law/parameters.hpp): those of a new part need nothing here.
+template <class T>
+concept ListsItself = requires {
+  T::list();
+};
+
 template <class T>
 constexpr bool is_stored_struct = [] {
-  constexpr std::size_t described = std::tuple_size_v<std::remove_cvref_t<decltype(members<T>)>>;
-  if constexpr (described > 0)
-    static_assert(described == member_count<T>(), "a member is missing from the list");
-  return described > 0;
+  if constexpr (ListsItself<T>) {
+    constexpr std::size_t described = std::tuple_size_v<decltype(T::list())>;
+    static_assert(sizeof(T) == described * sizeof(double), "a parameter is missing from its part's list");
+    return true;
+  } else {
+    constexpr std::size_t described = std::tuple_size_v<std::remove_cvref_t<decltype(members<T>)>>;
+    if constexpr (described > 0)
+      static_assert(described == member_count<T>(), "a member is missing from the list");
+    return described > 0;
+  }
 }();
 
 template <class T, class F>
 void for_each_member(F f) {
-  std::apply([&](const auto&... member) { (f(member.name, member.pointer), ...); }, members<T>);
+  if constexpr (ListsItself<T>)
+    std::apply([&](const auto&... parameter) { (f(parameter.name, parameter.value), ...); }, T::list());
+  else
+    std::apply([&](const auto&... member) { (f(member.name, member.pointer), ...); }, members<T>);
 }
 
 template <class T>
@@ -365,7 +376,21 @@ void get(const hdf5::Group& group, const char* name, T& value) {
   }
 }
 
-// A file can be sound and its content still not be a state.
+// A file can be sound and its content still not be a scene, or a state.
+void validate(const std::string& file, const dem::Scene& scene) {
+  for (int k = 0; k < dem::body_ids; ++k) {
+    using Shape = dem::Body::Shape;
+    const auto id = static_cast<dem::BodyId>(k);
+    const dem::Body& body = scene.body(id);
+    const auto fail = [&](const auto&... parts) {
+      throw error(file, ": /scene: bodies: ", dem::name_of(id), parts...);
+    };
+    if (body.shape != Shape::absent && body.shape != shape_of(id)) fail(" has the shape of another body");
+    if (body.axis < 0 || body.axis > 2) fail(" has the axis ", body.axis, ", none of 0, 1 and 2");
+    if (std::abs(body.facing) != 1) fail(" faces ", body.facing, ", neither 1 nor -1");
+  }
+}
+
 void validate(const std::string& file, const dem::State& state) {
   const std::size_t n = state.r.size();
   const auto fail = [&](const auto&... parts) { throw error(file, ": /state: ", parts...); };
@@ -394,7 +419,12 @@ void validate(const std::string& file, const dem::State& state) {
   }
   for (const dem::WallContact& c : state.wall_contacts) {
     if (!grain(c.i)) fail("no wall contact can be of grain ", c.i);
+    if (shape_of(c.wall) != dem::Body::Shape::plane)
+      fail("no wall contact can be with ", dem::name_of(c.wall));
   }
+  for (const dem::BodyId id : state.part_of)
+    if (id != dem::BodyId::none && shape_of(id) != dem::Body::Shape::layer)
+      fail("no grain can be part of ", dem::name_of(id));
   const auto pair = [](const dem::Contact& c) { return std::pair(c.i, c.j); };
   const auto wall_pair = [](const dem::WallContact& c) { return std::pair(c.wall, c.i); };
   if (!std::ranges::is_sorted(state.contacts, {}, pair)) fail("contacts are not sorted by (i, j)");
@@ -403,6 +433,7 @@ void validate(const std::string& file, const dem::State& state) {
 }
 
 void validate(const std::string& file, const Checkpoint& c) {
+  validate(file, c.scene);
   validate(file, c.state);
   const coupling::WaterState& w = c.water;
   const std::size_t n = c.state.r.size();

@@ -52,7 +52,7 @@ void write_grains(const hdf5::Group& grains, const dem::Scene& scene, const dem:
   for (std::size_t k = 0; k < displacement.size(); ++k) displacement[k] -= state.x_start[k];
 
   grains.write("id", arrange(state.id, rows), "1");
-  grains.write("role", arrange(state.role, rows), "1");
+  grains.write("role", arrange(state.part_of, rows), "1");
   grains.write("radius", arrange(state.r, rows), "m");
   grains.write("position", arrange(state.x, rows, [&](const Vec3d& x) { return wrap(scene, x); }), "m");
   grains.write("displacement", arrange(displacement, rows), "m");
@@ -259,7 +259,7 @@ SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::s
   file.set("step", staggered.step - start.step);
   file.set("stage_time", scene.time(staggered.step) - start.clock);
   file.set("box", scene.box);
-  file.set("top_wall", staggered.wall_z);
+  file.set("top_wall", staggered.wall_z());
   const dem::Loads loads = mean ? *mean : dem::loads_of(scene, staggered);
   write_grains(file.create_group("grains"), scene, staggered, loads);
   info.contacts = write_contacts(file.create_group("contacts"), scene, staggered, loads.contacts);

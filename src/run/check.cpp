@@ -25,7 +25,7 @@ namespace {
 double modulus(const cases::Case& c, const dem::State& s, double solid_fraction, double diameter) {
   const double z = s.contacts.empty() ? 5 : 2.0 * static_cast<double>(s.contacts.size()) / s.size();
   const double per_length = z * solid_fraction / (std::numbers::pi * diameter);
-  return per_length * (c.k_n / 3 + 4.0 / 3 * (2 * c.k_n + 3 * c.k_t) / 10);
+  return per_length * (c.contact.k_n / 3 + 4.0 / 3 * (2 * c.contact.k_n + 3 * c.contact.k_t) / 10);
 }
 
 void print_water(const cases::Case& c, const Stage& stage, const dem::State& s,
@@ -39,7 +39,7 @@ void print_water(const cases::Case& c, const Stage& stage, const dem::State& s,
   const double m = modulus(c, s, 1 - phi, stage.diameter), storage = phi * w.compressibility;
   const double d = k / (w.viscosity * storage), c_v = k / (w.viscosity * (1 / m + storage));
   const coupling::Stability stability = water.stability();
-  const bool wall = stage.scene.top_wall.drive != dem::TopWall::Drive::none;
+  const bool wall = stage.scene.has(dem::BodyId::top_wall);
   const double h = (wall ? height : w.height) / w.cells[2],
                interval = stage.scene.dt * static_cast<double>(water.interval());
   std::printf("    %s\n", water.describe().c_str());
@@ -92,7 +92,7 @@ void check_case(const Options& options) {
     std::string f;
     for (const cases::Stage& stage : c.stages) f += cases::to_toml(stage.f) + " ";
     std::printf("  preset        %s: f of the stages %s; stiffness divided by %g: k_n = %.4g N/m\n",
-                c.preset.c_str(), f.c_str(), c.softening, c.k_n);
+                c.preset.c_str(), f.c_str(), c.softening, c.contact.k_n);
   }
 
   std::printf("  backend       %s\n", engine->describe().c_str());
@@ -107,7 +107,7 @@ void check_case(const Options& options) {
     const dem::Scene& scene = stage.scene;
     // Before the bed has settled its height is not known: from the volume of the grains.
     const double height = c.start.empty() ? settled : stage.height_0;
-    double strain_rate = wanted.strain_rate != 0 ? wanted.strain_rate : scene.shear.velocity / height;
+    double strain_rate = wanted.strain_rate != 0 ? wanted.strain_rate : layer_velocity(scene) / height;
     const double duration = wanted.duration > 0 ? wanted.duration : wanted.strain / std::abs(strain_rate);
     const double steps = std::max(1.0, std::round(duration / scene.dt));
     Estimate::Time time{steps, std::numeric_limits<double>::quiet_NaN()};
@@ -135,8 +135,9 @@ void check_case(const Options& options) {
     if (wanted.normal_stress > 0) {
       const double r = 0.5 * diameter;
       std::printf(
-          "    stiffness   k_n/(sigma_0 d) = %.3g%s\n", c.k_n / (wanted.normal_stress * diameter),
-          c.k_n / (wanted.normal_stress * diameter) < 1e4 ? "  (below 1e4: softer than rigid grains)" : "");
+          "    stiffness   k_n/(sigma_0 d) = %.3g%s\n", c.contact.k_n / (wanted.normal_stress * diameter),
+          c.contact.k_n / (wanted.normal_stress * diameter) < 1e4 ? "  (below 1e4: softer than rigid grains)"
+                                                                  : "");
       if (strain_rate != 0) {
         const double inertia = std::abs(strain_rate) * r * std::sqrt(c.grains.density / wanted.normal_stress);
         std::printf("    inertia     I = %.3g (eq. 1)%s\n", inertia,

@@ -87,10 +87,13 @@ void Estimate::pack() {
   scene.box = {start_.box_x, start_.box_y, 0};
   scene.density = case_.grains.density, scene.gravity = 0, scene.ledger = false;
   const double mass = dem::sphere_mass(scene.density, *std::min_element(r.begin(), r.end()));
-  scene.dt = 0.15 * std::sqrt(mass / case_.k_n);
-  scene.grain = {case_.k_n, 0, 0.5 * std::sqrt(mass * case_.k_n), 0, 0, 0};
-  scene.wall = scene.grain;
-  scene.top_wall.drive = dem::TopWall::Drive::velocity;
+  scene.dt = 0.15 * std::sqrt(mass / case_.contact.k_n);
+  dem::ContactParameters smooth;
+  smooth.k_n = case_.contact.k_n, smooth.gamma_n = 0.5 * std::sqrt(mass * case_.contact.k_n);
+  smooth.k_t = smooth.mu_s = smooth.mu_d = 0;
+  scene.contact.fill(smooth);
+  scene.body(dem::BodyId::top_wall) = dem::top_wall();
+  scene.body(dem::BodyId::top_wall).z = dem::Drive::at(0);
   double volume = 0;
   for (const double radius : r) volume += dem::sphere_volume(radius);
   double height = volume / (1 - loosest) / scene.area();
@@ -101,7 +104,7 @@ void Estimate::pack() {
       height *= squeeze;
       for (dem::Vec3d& x : next.x) x.z *= squeeze;
     }
-    next.wall_z = height;
+    next.wall_z() = height;
     dem::sort_spatially(scene, next);
     engine_.load(scene, next);
     engine_.advance(k == 0 ? 400 : 40);
@@ -143,13 +146,14 @@ double Estimate::per_step(const Stage& stage, dem::State bed, double speed) {
     scene.exchange_interval = water->interval();
   }
   scene.dt *= slower;
-  scene.shear.velocity /= slower, scene.top_wall.velocity /= slower;
+  for (dem::Body& body : scene.bodies)
+    for (int a = 0; a < 3; ++a) body.along(a).velocity /= slower;
   for (dem::Vec3d& v : bed.v) v = (1 / slower) * v;
   bed.v[bed.size() / 2] = {speed / slower, 0, 0};
   // As long as the bed is still what it was: none has moved by more than half a diameter (and none falls
   // through the floor).
   const std::int64_t least = std::max<std::int64_t>(1, scene.exchange_interval);
-  const double fastest = std::max({speed, std::abs(stage.scene.shear.velocity), 1e-9});
+  const double fastest = std::max({speed, std::abs(layer_velocity(stage.scene)), 1e-9});
   const auto most =
       static_cast<std::int64_t>(std::clamp(0.5 * stage.diameter / (fastest * stage.scene.dt), 1.0, 1e9));
   const std::int64_t limit = std::max(least, most / least * least);
@@ -183,7 +187,7 @@ Estimate::Time Estimate::stage(std::size_t index, double duration) {
   if (loose_ && packed_.contacts.empty()) pack();
   dem::State bed = loose_ ? with_contacts(expected_contacts(wanted)) : packed_;
   output::Checkpoint now = start_.before;
-  if (index > 0) now.scene.shear = {};  // with layers of its own
+  if (index > 0) take_layers_away(now.scene);  // with layers of its own
   now.state = std::move(bed);
   Stage stage = prepare(case_, index, start_, now);
   bed = std::move(now.state);
@@ -194,12 +198,12 @@ Estimate::Time Estimate::stage(std::size_t index, double duration) {
   }
   const double steps = std::max(1.0, std::round(duration / stage.scene.dt));
   double speed = 0;  // m/s, of the fastest grain
-  if (wanted.kind == Kind::shear) speed = 3 * std::abs(stage.scene.shear.velocity);
+  if (wanted.kind == Kind::shear) speed = 3 * std::abs(layer_velocity(stage.scene));
   if (wanted.normal_stress > 0)  // what the wall has pushed comes to rest in a small part of the stage
     speed = std::max(speed, 0.02 * std::sqrt(wanted.normal_stress / case_.grains.density));
   const double way = bed_top(start_.before.state) - bed_top(bed);
-  const bool falls = loose_ && index == 0 && way > 0 && case_.gravity > 0 &&
-                     stage.scene.top_wall.drive == dem::TopWall::Drive::none;
+  const bool falls =
+      loose_ && index == 0 && way > 0 && case_.gravity > 0 && !stage.scene.has(dem::BodyId::top_wall);
   const double each = falls ? falling(stage, bed, way, duration) : per_step(stage, bed, speed);
   return {steps, scale_ * (steps * each + rows(stage, bed, duration))};
 }

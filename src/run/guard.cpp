@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dem/contact.hpp"
-#include "dem/engine_parts.hpp"
+#include "dem/body/motion.hpp"
 #include "dem/grain.hpp"
+#include "dem/scene_check.hpp"
 #include "error.hpp"
 
 namespace moraine::run {
@@ -27,12 +27,13 @@ void check_numbers(const Stage& stage, const dem::State& s) {
     if (!finite(s.x[i]) || !finite(s.v[i]) || !finite(s.omega[i]) || !finite(s.force[i]) ||
         !finite(s.torque[i]) || !finite(s.rotation[i]))
       throw error(grain_there(stage, s, i), "force or motion is not a finite number; try a smaller model.f");
-  if (!std::isfinite(s.wall_z + s.wall_v + s.wall_force + s.shear_force + s.layer_u))
-    throw error("top wall or driven layer", when(stage, s), ": height ", s.wall_z, " m, velocity ", s.wall_v,
-                " m/s, layer velocity ", s.layer_u,
-                " m/s: not all finite numbers; try a smaller model.f or a heavier wall.mass");
-  if (stage.scene.top_wall.drive != dem::TopWall::Drive::none && stage.scene.floor && s.wall_z <= 0)
-    throw error("top wall", when(stage, s), ": it fell through the floor, to ", s.wall_z,
+  for (const dem::BodyState& body : s.bodies)
+    if (!finite(body.x) || !finite(body.v) || !finite(body.force))
+      throw error("top wall or driven layer", when(stage, s), ": height ", s.wall_z(), " m, velocity ",
+                  s.at(dem::BodyId::top_wall).v.z, " m/s, layer velocity ", s.at(dem::BodyId::top_layer).v.x,
+                  " m/s: not all finite numbers; try a smaller model.f or a heavier wall.mass");
+  if (stage.scene.has(dem::BodyId::top_wall) && stage.scene.has(dem::BodyId::floor) && s.wall_z() <= 0)
+    throw error("top wall", when(stage, s), ": it fell through the floor, to ", s.wall_z(),
                 " m; no grains held it: check the start, wall.mass and normal_stress");
 }
 
@@ -72,8 +73,10 @@ Overlap deepest_overlap(const dem::Scene& scene, const dem::State& s) {
     take({depth / std::min(s.r[c.i], s.r[c.j]), depth, c.i, c.j, {}});
   }
   for (const dem::WallContact& w : s.wall_contacts) {
-    const bool top = w.wall == dem::WallName::top;
-    const double depth = -dem::at_wall(s.x[w.i].z, s.r[w.i], top ? s.wall_z : 0.0, top ? -1.0 : 1.0).delta_n;
+    const dem::Body& plane = scene.body(w.wall);
+    if (!plane.is_there()) continue;
+    const double depth =
+        -dem::gap_to_plane(s.x[w.i][plane.axis], s.r[w.i], dem::place_of(scene, s, w.wall), plane.facing);
     take({depth / s.r[w.i], depth, w.i, -1, w.wall});
   }
   return deepest;
@@ -85,7 +88,7 @@ std::string describe(const Overlap& o, const dem::State& s) {
   if (o.j >= 0)
     text << "grain " << s.id[o.j] << " at " << dem::triple(s.x[o.j]) << " m";
   else
-    text << (o.wall == dem::WallName::top ? "the top wall" : "the floor");
+    text << dem::name_of(o.wall);
   text << " by " << o.depth << " m, " << o.fraction << " of the smaller radius";
   return text.str();
 }

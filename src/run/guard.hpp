@@ -1,8 +1,8 @@
 // Stops a run that goes wrong, with one error that names cause, grain, step, place and remedy. It reads
 // states at fixed steps and writes nothing, so the bits of a healthy run are those of a run without it.
 //
-//   numbers    forces, torques, wall and layer are finite (the engine itself watches x, v and omega), and the
-//              top wall is above the floor
+//   numbers    forces, torques, planes and layers are finite (the engine itself watches x, v and omega), and
+//              the top wall is above the floor
 //   overlap    of two grains, or of a grain and a wall, over the radius of the smaller: <=
 //   guards.max_overlap.
 //              Linear springs are meant for hardly deformed spheres; at 0.2 each of two equal grains has lost
@@ -44,7 +44,7 @@ class Guard {
 struct Overlap {
   double fraction = 0, depth = 0;  // 1, m
   dem::Index i = -1, j = -1;       // memory order; j = -1: a wall
-  dem::WallName wall = dem::WallName::floor;
+  dem::BodyId wall = dem::BodyId::floor;
 };
 Overlap deepest_overlap(const dem::Scene& scene, const dem::State& state);
 std::string describe(const Overlap& overlap, const dem::State& state);

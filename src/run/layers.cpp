@@ -85,13 +85,13 @@ std::vector<std::string> choose_layers(const cases::Stage& stage, dem::State& s)
   const Layers l = layers_of(stage, s);
   const double height = bed_top(s);
   for (dem::Index i = 0; i < s.size(); ++i)
-    s.role[i] = s.x[i].z < l.bottom         ? dem::Role::bottom
-                : s.x[i].z > height - l.top ? dem::Role::top
-                                            : dem::Role::free;
-  const auto count = [&](dem::Role role) { return std::count(s.role.begin(), s.role.end(), role); };
-  const auto held = count(dem::Role::bottom), driven = count(dem::Role::top);
+    s.part_of[i] = s.x[i].z < l.bottom         ? dem::BodyId::bottom_layer
+                   : s.x[i].z > height - l.top ? dem::BodyId::top_layer
+                                               : dem::BodyId::none;
+  const auto count = [&](dem::BodyId id) { return std::count(s.part_of.begin(), s.part_of.end(), id); };
+  const auto held = count(dem::BodyId::bottom_layer), driven = count(dem::BodyId::top_layer);
   const double thinner = layers_that_would_do(s, height);
-  if (count(dem::Role::free) == 0 && !l.asked_for)
+  if (count(dem::BodyId::none) == 0 && !l.asked_for)
     throw error("stage ", stage.name, ": no grain is left free to deform: ", l.words, " hold ", held,
                 " grains and drive ", driven, " of a bed ", brief(height), " m high",
                 remedy(l, s, height, thinner));

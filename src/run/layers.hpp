@@ -12,7 +12,7 @@ namespace moraine::run {
 double bed_top(const dem::State& s);        // m, of the highest grain
 double mean_diameter(const dem::State& s);  // m
 
-// Gives the grains their roles; returns warnings, of a bed that is thin between the layers. Throws Error
+// Makes grains part of the layers; returns warnings, of a bed that is thin between the layers. Throws Error
 // where a layer swallows all of it.
 std::vector<std::string> choose_layers(const cases::Stage& stage, dem::State& s);
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dem/engine_parts.hpp"
+#include "dem/scene_check.hpp"
 #include "error.hpp"
 #include "memory.hpp"
 #include "run/guard.hpp"
@@ -34,14 +34,16 @@ std::vector<Mode> modes_of(const Stage& stage, const dem::State& s, double r) {
                      wall ? "wall_gamma_t" : "gamma_t", sticks(p, p.k_t), sticks(p, p.gamma_t),
                      3.5 * bodies * w, true});
   };
-  if (s.size() > 1) add(scene.grain, false, 2);
-  if (scene.floor || scene.top_wall.drive != dem::TopWall::Drive::none) add(scene.wall, true, 1);
-  if (scene.top_wall.drive == dem::TopWall::Drive::stress) {
+  if (s.size() > 1) add(scene.with(dem::Material::grain), false, 2);
+  const dem::ContactParameters& at_walls = scene.with(dem::Material::wall);
+  if (scene.has_planes()) add(at_walls, true, 1);
+  const dem::Body& top_wall = scene.body(dem::BodyId::top_wall);
+  if (top_wall.z.kind == dem::Drive::Kind::stress) {
     const double layer = std::round(
         std::clamp(scene.area() / (stage.diameter * stage.diameter), 1.0, static_cast<double>(s.size())));
-    const double mass = scene.top_wall.mass;
+    const double mass = top_wall.mass;
     modes.push_back({text("of the top wall (", mass, " kg) with up to ", layer, " grains on it"),
-                     "wall_gamma_n", scene.wall.k_n, scene.wall.gamma_n, w + layer / mass, false});
+                     "wall_gamma_n", at_walls.k_n, at_walls.gamma_n, w + layer / mass, false});
   }
   return modes;
 }
@@ -82,7 +84,9 @@ void check_step(const Stage& stage, const dem::State& s, std::vector<std::string
 void check_margin(const Stage& stage, const dem::State& s, std::vector<std::string>& warnings) {
   const dem::Scene& scene = stage.scene;
   if (scene.neighbour_margin <= 0) return;
-  double speed = std::max(std::abs(scene.shear.velocity), std::abs(scene.top_wall.velocity));
+  double speed = 0;
+  for (const dem::Body& body : scene.bodies)
+    for (int a = 0; a < 3; ++a) speed = std::max(speed, std::abs(body.along(a).velocity));
   for (const dem::Vec3d& v : s.v) speed = std::max(speed, std::sqrt(dot(v, v)));
   const double least = 4 * speed * scene.dt;
   if (scene.neighbour_margin <= least)
@@ -94,7 +98,7 @@ void check_margin(const Stage& stage, const dem::State& s, std::vector<std::stri
 
 void check_cells(const Stage& stage, const dem::State& s, std::vector<std::string>& warnings) {
   if (!stage.water.present) return;
-  const bool wall = stage.scene.top_wall.drive != dem::TopWall::Drive::none;
+  const bool wall = stage.scene.has(dem::BodyId::top_wall);
   const double length[3] = {stage.scene.box.x, stage.scene.box.y, wall ? stage.height_0 : stage.water.height};
   const auto largest = static_cast<dem::Index>(std::max_element(s.r.begin(), s.r.end()) - s.r.begin());
   const double d = 2 * s.r[largest];

@@ -11,7 +11,7 @@ namespace {
 
 double layer_displacement(const dem::State& s) {
   for (dem::Index i = 0; i < s.size(); ++i)
-    if (s.role[i] == dem::Role::top) return s.x[i].x - s.x_start[i].x;
+    if (s.part_of[i] == dem::BodyId::top_layer) return s.x[i].x - s.x_start[i].x;
   return 0;
 }
 

@@ -17,26 +17,29 @@ namespace moraine::run {
 namespace {
 
 using Kind = cases::Stage::Kind;
+using dem::BodyId;
 
 // kg; 0.001 rho N pi (cell/2)^3 gives the 6.4 kg of Table 1.
 double default_wall_mass(const cases::Case& c, double grains, double cell) {
   return 0.001 * c.grains.density * grains * std::numbers::pi * std::pow(cell / 2, 3);
 }
 
-dem::TopWall top_wall_of(const cases::Case& c, const cases::Stage& stage, const Start& start, double height) {
+dem::Body top_wall_of(const cases::Case& c, const cases::Stage& stage, const Start& start, double height) {
   using Wanted = cases::Stage::TopWall;
-  using Drive = dem::TopWall::Drive;
   const bool automatic = stage.top_wall == Wanted::automatic;
-  dem::TopWall wall;
-  if (stage.top_wall == Wanted::fixed || (automatic && stage.kind == Kind::uniaxial))
-    wall.drive = Drive::velocity;
-  else if (stage.top_wall == Wanted::stress || (automatic && stage.kind != Kind::settle))
-    wall.drive = Drive::stress;
-  if (wall.drive == Drive::none) return wall;
-  if (stage.kind == Kind::uniaxial) wall.velocity = -stage.strain_rate * height;
+  const bool given = stage.top_wall == Wanted::fixed || (automatic && stage.kind == Kind::uniaxial);
+  const bool stress = stage.top_wall == Wanted::stress || (automatic && stage.kind != Kind::settle);
+  if (!given && !stress) return {};
+  dem::Body wall = dem::top_wall();
   wall.mass = c.wall_mass > 0 ? c.wall_mass : start.wall_mass;
-  wall.sigma_0 = stage.normal_stress, wall.amplitude = stage.normal_stress_amplitude;
-  wall.frequency = stage.normal_stress_frequency, wall.phase = stage.normal_stress_phase;
+  if (given)
+    wall.z = dem::Drive::at(stage.kind == Kind::uniaxial ? -stage.strain_rate * height : 0);
+  else
+    wall.z = {.kind = dem::Drive::Kind::stress,
+              .mean = stage.normal_stress,
+              .amplitude = stage.normal_stress_amplitude,
+              .frequency = stage.normal_stress_frequency,
+              .phase = stage.normal_stress_phase};
   return wall;
 }
 
@@ -45,17 +48,24 @@ dem::Scene scene_of(const cases::Case& c, const cases::Stage& stage, const Start
   dem::Scene scene;
   scene.box = {start.box_x, start.box_y, start.box_z};
   scene.periodic_x = c.periodic_x, scene.periodic_y = c.periodic_y, scene.periodic_z = c.periodic_z;
-  scene.floor = c.floor, scene.gravity = c.gravity, scene.density = c.grains.density;
-  scene.grain = {c.k_n, c.k_t, stage.gamma_n, stage.gamma_t, stage.mu_s, stage.mu_d};
-  scene.wall = {c.k_n, c.wall_k_t, stage.wall_gamma_n, stage.wall_gamma_t, stage.wall_mu, stage.wall_mu};
+  scene.gravity = c.gravity, scene.density = c.grains.density;
+  dem::ContactParameters &grain = scene.with(dem::Material::grain), &wall = scene.with(dem::Material::wall);
+  grain = c.contact, wall = c.wall;
+  grain.gamma_n = stage.gamma_n, grain.gamma_t = stage.gamma_t;
+  grain.mu_s = stage.mu_s, grain.mu_d = stage.mu_d;
+  wall.gamma_n = stage.wall_gamma_n, wall.gamma_t = stage.wall_gamma_t;
+  wall.mu_s = wall.mu_d = stage.wall_mu;
   scene.neighbour_margin = c.neighbour_margin, scene.ledger = c.ledger;
   scene.fluid_density = stage.fluid ? c.fluid.density : 0;
-  scene.top_wall = top_wall_of(c, stage, start, height);
+  if (!c.floor) scene.body(BodyId::floor) = {};
+  scene.body(BodyId::top_wall) = top_wall_of(c, stage, start, height);
   if (!shears(stage.kind)) return scene;
-  scene.shear.drive = stage.kind == Kind::shear ? dem::Shear::Drive::velocity : dem::Shear::Drive::stress;
-  scene.shear.velocity = stage.velocity != 0 ? stage.velocity : stage.strain_rate * height;
-  scene.shear.stress = stage.shear_stress;
-  scene.shear.hold_z = stage.hold_layer_height;
+  const dem::Drive along_x =
+      stage.kind == Kind::shear
+          ? dem::Drive::at(stage.velocity != 0 ? stage.velocity : stage.strain_rate * height)
+          : dem::Drive::by(stage.shear_stress);
+  scene.body(BodyId::bottom_layer) = dem::layer({}, stage.hold_layer_height);
+  scene.body(BodyId::top_layer) = dem::layer(along_x, stage.hold_layer_height);
   return scene;
 }
 
@@ -74,6 +84,12 @@ output::Checkpoint read_start(const std::filesystem::path& path) {
 
 bool shears(Kind k) { return k == Kind::shear || k == Kind::shear_stress; }
 
+double layer_velocity(const dem::Scene& scene) { return scene.body(BodyId::top_layer).x.velocity; }
+
+void take_layers_away(dem::Scene& scene) {
+  scene.body(BodyId::bottom_layer) = scene.body(BodyId::top_layer) = {};
+}
+
 double sauter_diameter(const dem::State& s) {
   double volume = 0, area = 0;
   for (const double r : s.r) volume += r * r * r, area += r * r;
@@ -83,7 +99,9 @@ double sauter_diameter(const dem::State& s) {
 // dt = f sqrt(min m / max k), eq. 9; the walls count among the k.
 double step_by_eq_9(const dem::Scene& scene, const dem::State& s, double f) {
   const double m = dem::sphere_mass(scene.density, *std::min_element(s.r.begin(), s.r.end()));
-  return f * std::sqrt(m / std::max({scene.grain.k_n, scene.grain.k_t, scene.wall.k_n, scene.wall.k_t}));
+  double k = 0;
+  for (const dem::ContactParameters& p : scene.contact) k = std::max({k, p.k_n, p.k_t});
+  return f * std::sqrt(m / k);
 }
 
 static double step_of(const cases::Case& c, const cases::Stage& stage, const dem::Scene& scene,
@@ -105,8 +123,8 @@ Start start_of(const cases::Case& c) {
     if (s.box_z <= 0) s.box_z = scene.box.z;
     const dem::State& state = s.before.state;
     const double r_max = *std::max_element(state.r.begin(), state.r.end());
-    s.wall_mass = scene.top_wall.mass > 0 ? scene.top_wall.mass
-                                          : default_wall_mass(c, state.size(), c.grains.cell * 2 * r_max);
+    const double mass = scene.body(BodyId::top_wall).mass;
+    s.wall_mass = mass > 0 ? mass : default_wall_mass(c, state.size(), c.grains.cell * 2 * r_max);
     return s;
   }
   expect_room(c);
@@ -146,7 +164,7 @@ coupling::Water water_of(const cases::Case& c, const cases::Stage& stage, const 
   w.k_c = f.permeability_factor > 0 ? f.permeability_factor : sauter * sauter / 180;
   w.porosity_range = {f.porosity_min, f.porosity_max};
   w.height = f.height > 0 ? f.height : height + f.cell * diameter;
-  const bool wall = scene.top_wall.drive != dem::TopWall::Drive::none;
+  const bool wall = scene.has(BodyId::top_wall);
   const double length[3] = {scene.box.x, scene.box.y, wall ? height : w.height};
   const std::int64_t wanted[3] = {f.cells_x, f.cells_y, f.cells_z};
   for (int a = 0; a < 3; ++a) {
@@ -190,7 +208,7 @@ bool goes_on(const cases::Case& c, const cases::Stage& stage, const Start& start
 }
 
 double nominal_rate(const cases::Stage& stage, const output::Checkpoint& now) {  // 1/s, u/H_0 or axial
-  return shears(stage.kind) ? now.scene.shear.velocity / now.height_0 : stage.strain_rate;
+  return shears(stage.kind) ? layer_velocity(now.scene) / now.height_0 : stage.strain_rate;
 }
 
 double duration_of(const cases::Stage& stage, double strain_rate) {  // s
@@ -213,7 +231,7 @@ std::vector<std::string> asks_for_other_layers(const cases::Case& c, std::size_t
 void forget(const cases::Stage& stage, dem::State& s) {
   if (stage.zero_kinematics) {
     for (auto* v : {&s.v, &s.omega, &s.rotation}) std::fill(v->begin(), v->end(), dem::Vec3d{0, 0, 0});
-    s.wall_v = s.layer_u = 0;
+    for (dem::BodyState& body : s.bodies) body.v = {0, 0, 0};
   }
   if (stage.clear_history) {
     for (dem::Contact& contact : s.contacts) contact.delta_t = {0, 0, 0}, contact.slipping = 0;
@@ -221,21 +239,21 @@ void forget(const cases::Stage& stage, dem::State& s) {
   }
 }
 
-// Roles of the grains, and what displacement, strain and dilation are counted from; returns warnings.
+// Which grains are part of layers, and what displacement, strain and dilation are counted from; returns
+// warnings.
 std::vector<std::string> set_reference(const cases::Case& c, std::size_t index, output::Checkpoint& now) {
   const cases::Stage& stage = c.stages[index];
   dem::State& s = now.state;
   std::vector<std::string> warnings;
-  if (shears(stage.kind) && now.scene.shear.drive != dem::Shear::Drive::none)
-    return asks_for_other_layers(c, index);
+  if (shears(stage.kind) && now.scene.has(BodyId::top_layer)) return asks_for_other_layers(c, index);
   if (shears(stage.kind)) {
     warnings = choose_layers(stage, s);
   } else {
-    std::fill(s.role.begin(), s.role.end(), dem::Role::free);
-    s.layer_u = 0;
+    std::fill(s.part_of.begin(), s.part_of.end(), BodyId::none);
+    s.at(BodyId::bottom_layer) = s.at(BodyId::top_layer) = {};
   }
   s.x_start = s.x;
-  now.height_0 = s.wall_z > 0 ? s.wall_z : bed_top(s);
+  now.height_0 = s.wall_z() > 0 ? s.wall_z() : bed_top(s);
   return warnings;
 }
 
@@ -281,13 +299,14 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, outpu
     out.warnings = asks_for_other_layers(c, index);
     return out;
   }
-  if (s.staggered && now.scene.grain.mu_d == now.scene.grain.mu_s) dem::mark_slipping(now.scene, s);
+  const dem::ContactParameters& grain = now.scene.with(dem::Material::grain);
+  if (s.staggered && grain.mu_d == grain.mu_s) dem::mark_slipping(now.scene, s);
   dem::synchronise(now.scene, s);
   forget(stage, s);
-  if (top_wall_of(c, stage, start, 0).drive == dem::TopWall::Drive::none)
-    s.wall_z = 0;
-  else if (s.wall_z <= 0)
-    s.wall_z = bed_top(s);  // lowered onto the highest grain
+  if (!top_wall_of(c, stage, start, 0).is_there())
+    s.at(BodyId::top_wall) = {};
+  else if (s.wall_z() <= 0)
+    s.wall_z() = bed_top(s);  // lowered onto the highest grain
   const std::vector<std::string> warnings = set_reference(c, index, now);
   s.step = 0, s.staggered = false, s.ledger = {};
   s.water_force.clear(), s.water = {};
@@ -312,7 +331,7 @@ output::Checkpoint foreseen(const cases::Case& c, std::size_t index, const Start
     now = foreseen(c, index - 1, start);
     prepare(c, index - 1, start, now);  // for the layers that it will keep
   } else {
-    now.scene.shear = {};
+    take_layers_away(now.scene);
   }
   return now;
 }

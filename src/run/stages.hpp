@@ -43,6 +43,8 @@ struct Stage {
 
 // Whether the kind of stage drives a layer of grains along x.
 bool shears(cases::Stage::Kind kind);
+double layer_velocity(const dem::Scene& scene);  // m/s, given to the top layer; 0 where none is given
+void take_layers_away(dem::Scene& scene);
 
 // Makes the grains of `now` ready for stage `index` of the case and returns what drives them; scene,
 // water_settings, height_0 and the beginning of the clock of `now` become those of the stage. `start` gives

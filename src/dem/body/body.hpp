@@ -77,6 +77,12 @@ struct Body {
   bool operator==(const Body&) const = default;
 };
 
+// Of the body with this name, where it is there; absent: of none.
+constexpr Body::Shape shape_of(BodyId id) {
+  if (id == BodyId::none) return Body::Shape::absent;
+  return id == BodyId::bottom_layer || id == BodyId::top_layer ? Body::Shape::layer : Body::Shape::plane;
+}
+
 // Held unless told otherwise.
 constexpr Body plane(int axis, double facing, double place = 0) {
   return {.shape = Body::Shape::plane, .axis = axis, .facing = facing, .place = place};
