@@ -25,7 +25,7 @@ class Halving {
     Index* const middle = begin + std::clamp<Index>(whole, 1, n - 1);
     const int axis = longest(begin, end);
     std::nth_element(begin, middle, end, [&](Index a, Index b) {
-      return std::tie(state_.x[a][axis], state_.id[a]) < std::tie(state_.x[b][axis], state_.id[b]);
+      return std::pair(state_.x[a][axis], state_.id[a]) < std::pair(state_.x[b][axis], state_.id[b]);
     });
     (*this)(begin, middle, chunk), (*this)(middle, end, chunk);
   }

@@ -9,7 +9,11 @@ struct Vec3 {
   T x, y, z;
 
   MORAINE_HD T& operator[](int axis) { return axis == 0 ? x : axis == 1 ? y : z; }
-  MORAINE_HD const T& operator[](int axis) const { return axis == 0 ? x : axis == 1 ? y : z; }
+  MORAINE_HD T operator[](int axis) const { return axis == 0 ? x : axis == 1 ? y : z; }
+  // As v[axis] = value, but leaves the vector in registers where the axis is known only at run time.
+  MORAINE_HD void set(int axis, const T& value) {
+    x = axis == 0 ? value : x, y = axis == 1 ? value : y, z = axis == 2 ? value : z;
+  }
   MORAINE_HD Vec3& operator+=(const Vec3& b) { return *this = *this + b; }
   MORAINE_HD Vec3& operator-=(const Vec3& b) { return *this = *this - b; }
 

@@ -76,7 +76,7 @@ struct GrainTasks {
   MORAINE_HD float motion(Index i, const LoadRow& load) const {
     GrainRow g = w.grain[step & 1][i];
     const Servo* const servo = servo_of(w.part_of[i]);
-    if (servo) g.v[servo->axis] = servo->v;
+    if (servo) g.v.set(servo->axis, servo->v);
     const Triple dt(Vec3d{w.scene.dt, w.scene.dt, w.scene.dt});
     const Mobility m = mobility(w.scene, g);
     const Triple acceleration = m.acceleration(pushed(i, load).f),
@@ -89,7 +89,7 @@ struct GrainTasks {
     if constexpr (damped) {
       NowRow now{axpy<double>(0.5 * w.scene.dt, acceleration, g.v), 0,
                  axpy<double>(0.5 * w.scene.dt, spin_acceleration, g.omega), 0};
-      if (servo) now.v[servo->axis] = servo->v_ahead;
+      if (servo) now.v.set(servo->axis, servo->v_ahead);
       w.now[next][i] = now;
     }
     return is_lost(bodies, g) ? std::numeric_limits<float>::infinity()

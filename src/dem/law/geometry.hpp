@@ -36,7 +36,7 @@ MORAINE_HD double gap_to_plane(double x, double r, double place, double facing) 
 MORAINE_HD Geometry<double> at_plane(const Vec3d& x, double r, int axis, double place, double facing) {
   const double delta_n = gap_to_plane(x[axis], r, place, facing);
   Geometry<double> g{{0, 0, 0}, delta_n, r + 0.5 * delta_n, 0, 0};
-  g.n[axis] = facing;
+  g.n.set(axis, facing);
   return g;
 }
 
