@@ -105,10 +105,10 @@ class CudaTeam {
 template <class Body>
 __global__ void __launch_bounds__(CudaTeam::most_threads)
     cooperate_kernel(const __grid_constant__ Body body) {
-  using Desk = typename Body::Desk;
+  using Shared = typename Body::Shared;
   __shared__ CudaTeam::Slot slots[CudaTeam::most_threads];
-  __shared__ alignas(16) unsigned char desk[sizeof(Desk)];
-  body(CudaTeam(slots), *reinterpret_cast<Desk*>(desk));
+  __shared__ alignas(16) unsigned char shared[sizeof(Shared)];
+  body(CudaTeam(slots), *reinterpret_cast<Shared*>(shared));
 }
 
 struct Cuda {

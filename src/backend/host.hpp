@@ -101,7 +101,7 @@ struct Host {
     for (std::int64_t i = 0; i < n; ++i) body(i);
   }
 
-  // body(team, desk) on several blocks at once, each with a desk of its own: memory that its threads share,
+  // body(team, shared) on several blocks at once, each with memory of its own that its threads share,
   // in any state. There is work for so many units; a block takes one or several at once, of `unit` items.
   template <class Body>
   void cooperate(std::int64_t units, int unit, const Body& body) const {
@@ -109,8 +109,8 @@ struct Host {
     Barrier barrier(blocks);
     run_team(blocks, [&](int block) {
       Team team(block, blocks, unit, barrier);
-      typename Body::Desk desk;
-      body(team, desk);
+      typename Body::Shared shared;
+      body(team, shared);
     });
   }
 

@@ -12,9 +12,9 @@ inline int available_cores() { return omp_get_num_procs(); }
 
 // Passes the time while a thread has nothing to do: spins briefly, then lets others run, for the machine may
 // be shared.
-class Patience {
+class SpinWait {
  public:
-  void wait() {
+  void once() {
     if (++turns_ < 1000) {
 #if defined(__x86_64__)
       __builtin_ia32_pause();
@@ -24,7 +24,7 @@ class Patience {
     }
   }
   int turns() const { return turns_; }  // some 20 to 40 ns each
-  void renew() { turns_ = 0; }
+  void start_anew() { turns_ = 0; }
 
  private:
   int turns_ = 0;
@@ -42,7 +42,7 @@ class Barrier {
       phase_.store(phase + 1, std::memory_order_release);
       return;
     }
-    for (Patience patience; phase_.load(std::memory_order_acquire) == phase;) patience.wait();
+    for (SpinWait wait; phase_.load(std::memory_order_acquire) == phase;) wait.once();
   }
 
  private:

@@ -79,6 +79,24 @@ Key records(Key key) {
   return key;
 }
 
+// The rows of one vertical side of the water's grid.
+template <auto side>
+std::vector<Key> side_rows(const string& name, const string& place) {
+  const string key = "fluid." + name, axis = name.substr(0, 1);
+  constexpr auto fluid = &Case::fluid;
+  return {
+      // clang-format off
+      row<fluid, side, &FluidSide::kind>(key, "", "\"no_flow\"", "no_flow | pressure | flux", "the side " + place + ", where " + axis + " is not periodic: tight, at " + name + "_pressure, or with " + name + "_flux through it"),
+      row<fluid, side, &FluidSide::pressure>(key + "_pressure", "Pa", "0", "", "over hydrostatic, at that side"),
+      row<fluid, side, &FluidSide::flux>(key + "_flux", "m/s", "0", "", "Darcy velocity through that side, into the bed"),
+      // clang-format on
+  };
+}
+
+void append(std::vector<Key>& table, const std::vector<Key>& rows) {
+  table.insert(table.end(), rows.begin(), rows.end());
+}
+
 std::vector<Key> make_keys() {
   using C = Case;
   using G = Grains;
@@ -93,7 +111,7 @@ std::vector<Key> make_keys() {
   constexpr auto contact = &C::contact;
   constexpr auto wall = &C::wall;
   const string sheared = "shear, shear_stress", damped = "; settle, consolidate: ";
-  return {
+  std::vector<Key> table{
       // clang-format off
       no_physics(row<&C::title>("title", "", "\"\"", "", "what the case is about")),
       {"extends", Type::text, "", "\"\"", "", "directory of a case whose keys and stages this one takes over", "", nullptr},
@@ -155,19 +173,14 @@ std::vector<Key> make_keys() {
       row<fluid, &F::exchange_interval>("fluid.exchange_interval", "", "0", ">= 0", "steps between exchanges of grains and water; 0: the longest that is stable"),
       no_physics(row<fluid, &F::solver>("fluid.solver", "", "\"automatic\"", "automatic | pcg | cholmod", "for the pressure")),
       no_physics(row<fluid, &F::tolerance>("fluid.tolerance", "1", "1e-10", "1e-15 .. 1e-6", "of the residual over the right-hand side (pcg)")),
-      row<fluid, &F::x_low, &FluidSide::kind>("fluid.x_low", "", "\"no_flow\"", "no_flow | pressure | flux", "the side x = 0, where x is not periodic: tight, at x_low_pressure, or with x_low_flux through it"),
-      row<fluid, &F::x_low, &FluidSide::pressure>("fluid.x_low_pressure", "Pa", "0", "", "over hydrostatic, at that side"),
-      row<fluid, &F::x_low, &FluidSide::flux>("fluid.x_low_flux", "m/s", "0", "", "Darcy velocity through that side, into the bed"),
-      row<fluid, &F::x_high, &FluidSide::kind>("fluid.x_high", "", "\"no_flow\"", "no_flow | pressure | flux", "the side x = box.x, where x is not periodic: tight, at x_high_pressure, or with x_high_flux through it"),
-      row<fluid, &F::x_high, &FluidSide::pressure>("fluid.x_high_pressure", "Pa", "0", "", "over hydrostatic, at that side"),
-      row<fluid, &F::x_high, &FluidSide::flux>("fluid.x_high_flux", "m/s", "0", "", "Darcy velocity through that side, into the bed"),
-      row<fluid, &F::y_low, &FluidSide::kind>("fluid.y_low", "", "\"no_flow\"", "no_flow | pressure | flux", "the side y = 0, where y is not periodic: tight, at y_low_pressure, or with y_low_flux through it"),
-      row<fluid, &F::y_low, &FluidSide::pressure>("fluid.y_low_pressure", "Pa", "0", "", "over hydrostatic, at that side"),
-      row<fluid, &F::y_low, &FluidSide::flux>("fluid.y_low_flux", "m/s", "0", "", "Darcy velocity through that side, into the bed"),
-      row<fluid, &F::y_high, &FluidSide::kind>("fluid.y_high", "", "\"no_flow\"", "no_flow | pressure | flux", "the side y = box.y, where y is not periodic: tight, at y_high_pressure, or with y_high_flux through it"),
-      row<fluid, &F::y_high, &FluidSide::pressure>("fluid.y_high_pressure", "Pa", "0", "", "over hydrostatic, at that side"),
-      row<fluid, &F::y_high, &FluidSide::flux>("fluid.y_high_flux", "m/s", "0", "", "Darcy velocity through that side, into the bed"),
-
+      // clang-format on
+  };
+  append(table, side_rows<&F::x_low>("x_low", "x = 0"));
+  append(table, side_rows<&F::x_high>("x_high", "x = box.x"));
+  append(table, side_rows<&F::y_low>("y_low", "y = 0"));
+  append(table, side_rows<&F::y_high>("y_high", "y = box.y"));
+  const std::vector<Key> of_stages_and_output{
+      // clang-format off
       row<&S::name>("stage.name", "", required, "", "unique; letters, digits, - and _"),
       row<&S::kind>("stage.kind", "", required, "settle | consolidate | shear | shear_stress | uniaxial", "what is done to the bed"),
       row<&S::duration>("stage.duration", "s", "0", ">= 0", "of the stage; this or strain"),
@@ -212,6 +225,8 @@ std::vector<Key> make_keys() {
       no_physics(row<guards, &Guards::max_residue>("guards.max_residue", "1", "0.1", "> 0", "energy created or lost over that stored and put in; beyond it the run stops")),
       // clang-format on
   };
+  append(table, of_stages_and_output);
+  return table;
 }
 
 // Insertions, deletions, substitutions and swaps of neighbours from one word to the other.

@@ -32,14 +32,12 @@
 
 #include "backend/number.hpp"
 #include "coupling/ball.hpp"
+#include "coupling/faces.hpp"
 #include "coupling/hats.hpp"
 #include "dem/grain.hpp"
 #include "fluid/grid.hpp"
 
 namespace moraine::coupling {
-
-// A number for each face of each axis.
-using Faces = std::array<std::vector<double>, 3>;
 
 // Solids beyond the low and the high side of each axis.
 struct Outside {

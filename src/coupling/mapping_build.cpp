@@ -4,6 +4,7 @@
 
 #include "coupling/mapping.hpp"
 #include "dem/scene.hpp"
+#include "dem/sums.hpp"
 
 namespace moraine::coupling {
 

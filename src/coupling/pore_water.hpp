@@ -10,27 +10,21 @@
 // them: the work on the grains is the work of the pressure, and momentum telescopes. Along z the grid is
 // stretched between floor and wall. An impermeable wall displaces A dH and carries p A; a drained one carries
 // the pressure of the side.
+//
+// pore_water.cpp has the exchange. Its parts: skeleton (what grains are to the water), faces (div, grad p),
+// thrust (f_i), account (what drained), stability (m), readings and describe (what one is told).
 #pragma once
-#include <array>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "coupling/stability.hpp"
 #include "coupling/water.hpp"
 #include "dem/scene.hpp"
 #include "dem/state.hpp"
 #include "dem/surroundings.hpp"
 
 namespace moraine::coupling {
-
-// How often grains and water must meet. Undrained water and skeleton swing with w_f and w_sk at most, and
-// with impulses every m steps they stay bounded while m dt sqrt(w_sk^2 + w_f^2) < 2.
-struct Stability {
-  double w_sk = 0,
-         w_f = 0;  // rad/s; largest of the dry contact network, and of the grains on the water's stiffness
-  std::int64_t longest = 0;  // steps; 0: not even every step
-  double longest_dt = 0;     // s, with which an exchange at every step would be stable
-};
 
 class PoreWater : public dem::Surroundings {
  public:
@@ -47,14 +41,6 @@ class PoreWater : public dem::Surroundings {
   virtual std::string describe()
       const = 0;  // e.g. "water: 8 x 8 x 7 cells of 0.105 m (2.6 d), exchange every step, pcg"
 };
-
-constexpr double bytes_a_cell = 600;  // measured, without what CHOLMOD fills in
-
-// By what part pressures that drain through floor or top even out too fast on a grid of so few cells, 0 where
-// they do not drain there: (pi/2n)^2/6 over n cells from the closed end, or the middle, to a drained one.
-// Hats spread the pressure of a cell over its neighbours, the grains store less for it (- (pi/2n)^2/4), and
-// the flow between centres makes up for a third.
-double error_of_few_cells(const Water& water);
 
 // Whether this build has pore water in it (MORAINE_FLUID).
 bool water_built();

@@ -39,6 +39,8 @@ struct Water {
   bool operator==(const Water&) const = default;
 };
 
+constexpr double bytes_a_cell = 600;  // measured, without what CHOLMOD fills in
+
 // All that must be known to go on from an exchange with the same bits, beside the grains.
 struct WaterState {
   std::vector<std::int32_t> cells;  // along x, y, z

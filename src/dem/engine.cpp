@@ -1,5 +1,6 @@
+#include "dem/engine.hpp"
 #include "backend/team.hpp"
-#include "dem/engine_parts.hpp"
+#include "error.hpp"
 
 namespace moraine::dem {
 

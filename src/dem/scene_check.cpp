@@ -31,6 +31,9 @@ void check_bodies(const Scene& s, const State& state) {
         throw error("top wall mass = ", b.mass, " kg: expected a positive number");
     }
   }
+  for (const BodyId id : state.part_of)
+    if (id != BodyId::none && s.body(id).shape != Body::Shape::layer)
+      throw error("grains are part of ", name_of(id), ", which the scene has not");
   const Body &bottom = s.body(BodyId::bottom_layer), &top = s.body(BodyId::top_layer);
   for (const Body* b : {&bottom, &top})
     if (b->is_there() &&

@@ -18,6 +18,22 @@
 
 namespace moraine::dem {
 
+// Whether grains and pore water meet at this step.
+MORAINE_HD bool exchanges(const Scene& scene, std::int64_t step) {
+  return scene.exchange_interval > 0 && step % scene.exchange_interval == 0;
+}
+// What the water of the last exchange does to bodies at this step.
+MORAINE_HD WaterReaction reaction_at(const Scene& scene, const WaterReaction& last_exchange,
+                                     std::int64_t step) {
+  if (exchanges(scene, step) || scene.exchange_interval == 0) return last_exchange;
+  return {last_exchange.wall_between, 0, 0, last_exchange.wall_between};
+}
+// A load with the impulse of the water that this step adds to it, if any.
+MORAINE_HD LoadRow with_water(const Scene& scene, std::int64_t step, LoadRow load, const Vec3d& water) {
+  if (exchanges(scene, step)) load.f = axpy(static_cast<double>(scene.exchange_interval), water, load.f);
+  return load;
+}
+
 class Surroundings {
  public:
   virtual ~Surroundings() = default;

@@ -1,6 +1,7 @@
 // Grains and water against answers that are known: consolidation, undrained loading, heave.
 #include <algorithm>
 
+#include "coupling/describe.hpp"
 #include "wet_scenes.hpp"
 
 namespace moraine::coupling {

@@ -1,5 +1,5 @@
 #include "backend/cuda.cuh"
-#include "dem/gather_engine.hpp"
+#include "dem/gpu/gather_engine.hpp"
 
 namespace moraine::dem {
 

@@ -1,4 +1,4 @@
-#include "dem/gather_engine.hpp"
+#include "dem/gpu/gather_engine.hpp"
 
 namespace moraine::dem {
 

@@ -1,0 +1,58 @@
+// The grains as the water meets them: weights (mapping.hpp), porosity, permeability (Kozeny-Carman) and the
+// gaps at the walls, all made anew from where grains are.
+#pragma once
+#include <vector>
+
+#include "coupling/mapping.hpp"
+#include "coupling/water.hpp"
+#include "dem/scene.hpp"
+#include "dem/state.hpp"
+#include "dem/touching.hpp"
+#include "fluid/step.hpp"
+
+namespace moraine::coupling {
+
+// The grid that the water asks for, so high, m. Throws Error where that is none, or larger than memory
+// allows.
+fluid::Grid grid_over(const Water& water, const dem::Scene& scene, double height);
+
+// As the flow sees them: none through an impermeable top.
+fluid::Sides sides_of(const Water& water);
+
+class Skeleton {
+ public:
+  // Empty until make().
+  Skeleton(const Water& water, const dem::Scene& scene, const dem::State& grains, const fluid::Grid& grid);
+
+  // From grains at x (m, memory order) and for a grid so high (m). Displacements then count from x.
+  void make(const std::vector<dem::Vec3d>& x, double height);
+
+  const fluid::Grid& grid() const { return grid_; }
+  const fluid::Medium& medium() const { return medium_; }
+  const Mapping& mapping() const { return mapping_; }
+  Mapping& mapping() { return mapping_; }
+  const std::vector<double>& volume() const { return volume_; }  // m3, of each grain
+  double solids() const { return solids_; }                      // m3, of all
+
+  // m, the longest way along an axis from x to where grains are now; of those beyond a side at both ends
+  // none.
+  double longest_way(const std::vector<dem::Vec3d>& x, const dem::GrainRow* now) const;
+
+ private:
+  bool beyond(const dem::Vec3d& x, double r) const;
+  std::vector<double> squeeze(const std::vector<dem::Vec3d>& x);
+
+  Water water_;
+  dem::Scene scene_;
+  fluid::Grid grid_;
+  SidesOf sides_;
+  std::vector<dem::GrainRow> grains_;  // where they were at make()
+  std::vector<double> volume_;
+  double solids_ = 0;
+  std::vector<bool> top_layer_;
+  dem::TouchingPairs touching_;
+  Mapping mapping_;
+  fluid::Medium medium_;
+};
+
+}  // namespace moraine::coupling

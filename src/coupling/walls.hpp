@@ -1,0 +1,24 @@
+// What the water minds of a scene's walls and of its driven layer. How a scene describes them is known here
+// alone in src/coupling.
+#pragma once
+#include "dem/body/motion.hpp"
+
+namespace moraine::coupling {
+
+inline bool has_floor(const dem::Scene& scene) { return scene.has(dem::BodyId::floor); }
+inline bool has_wall(const dem::Scene& scene) { return scene.has(dem::BodyId::top_wall); }
+
+// kg, of a top wall that answers to forces; 0: of one that does not.
+inline double mass_of_free_wall(const dem::Scene& scene) {
+  const dem::Body& wall = scene.body(dem::BodyId::top_wall);
+  return wall.z.kind == dem::Drive::Kind::stress ? wall.mass : 0;
+}
+
+// m, where a top wall stands.
+inline double wall_z(const dem::BodyMotion& bodies) { return bodies.find(dem::BodyId::top_wall)->place; }
+
+inline bool in_top_layer(const dem::State& grains, dem::Index i) {
+  return grains.part_of[i] == dem::BodyId::top_layer;
+}
+
+}  // namespace moraine::coupling

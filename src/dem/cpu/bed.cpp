@@ -1,0 +1,119 @@
+#include "dem/cpu/bed.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "dem/body/plane_contact.hpp"
+#include "dem/cpu/rows.hpp"
+#include "dem/scene_check.hpp"
+#include "dem/state_rows.hpp"
+
+namespace moraine::dem {
+
+namespace {
+
+std::vector<Chunk> chunks_of(const Bed& bed, const State& s, const BodyMotion& bodies) {
+  std::vector<Chunk> chunks(chunk_count(bed.n));
+  for (Index c = 0; c < static_cast<Index>(chunks.size()); ++c) {
+    Chunk& chunk = chunks[c];
+    chunk.number = c;
+    chunk.begin = c * bed.chunk_size, chunk.end = std::min(bed.n, chunk.begin + bed.chunk_size);
+    for (int k = 0; k < bodies.servos; ++k)
+      for (Index i = chunk.begin; i < chunk.end; ++i)
+        if (s.part_of[i] == bodies.servo[k].body) chunk.members[k].push_back(i);
+  }
+  return chunks;
+}
+
+// As near pairs, from which the search takes their springs. Contacts are sorted.
+void place_contacts(std::vector<Chunk>& chunks, const std::vector<Contact>& contacts) {
+  auto contact = contacts.begin();
+  for (Chunk& chunk : chunks)
+    for (; contact != contacts.end() && contact->i < chunk.end; ++contact) {
+      const auto& [i, j, delta_t, slipping] = *contact;
+      const int part = j < chunk.end ? 0 : 1;
+      const Index place = chunk.near[part].add(i, j, 0, false, {delta_t, slipping});
+      chunk.candidates[part].push_back({i, j, no_link, place});
+    }
+}
+
+void place_plane_contacts(Bed& bed, const std::vector<WallContact>& contacts, const BodyMotion& bodies) {
+  for (const WallContact& w : contacts)
+    if (const Plane* plane = bodies.find(w.wall))
+      bed.chunks[w.i / bed.chunk_size].planes.push_back(
+          {w.i, static_cast<std::int32_t>(plane - bodies.plane), {w.delta_t, w.slipping}});
+  for (Chunk& chunk : bed.chunks)
+    std::ranges::sort(chunk.planes, {}, [](const PlanePair& p) { return std::tuple(p.i, p.plane); });
+}
+
+}  // namespace
+
+void Bed::load_state(const Scene& s, const State& state, const BodyMotion& bodies) {
+  scene = s, sides = Sides::of(s), uses = uses_of(s);
+  n = state.size();
+  r_max = *std::max_element(state.r.begin(), state.r.end());
+  margin = neighbour_margin(s, state);
+  chunk_size = dem::chunk_size(n);
+
+  part_of.set(state.part_of);
+  grain.resize(n + 1), load.resize(n);
+  now.resize(uses.damped ? n + 1 : 0);
+  damping.resize(uses.damping_ledger() ? n : 0);
+  clear(damping);
+  water.resize(uses.water ? n : 0);
+  const std::vector<GrainRow> rows = grain_rows(s, state);
+  std::copy(rows.begin(), rows.end(), grain.data());
+  for (Index i = 0; i < n; ++i) load.data()[i] = {state.force[i], 0, state.torque[i], 0};
+  for (Index i = 0; i < static_cast<Index>(water.size()); ++i)
+    water.data()[i] = {state.staggered ? state.water_force[i] : Vec3d{0, 0, 0}, 0};
+  // One grain that never touches, for the last lanes of a list; at no round place, lest a grain be there.
+  grain.data()[n] = {
+      {-987654321.12, -876543210.98, -765432109.87}, -1e9, {0, 0, 0}, -1e9, {0, 0, 0}, 0, {0, 0, 0}, 0};
+  if (uses.damped) now.data()[n] = {};
+
+  chunks = chunks_of(*this, state, bodies);
+  place_contacts(chunks, state.contacts);
+  place_plane_contacts(*this, state.wall_contacts, bodies);
+}
+
+Reaction sum_reactions(const Bed& bed, const BodyMotion& bodies) {
+  const auto sum = [&](auto&& number) {
+    return sum_over_chunks(bed.chunks, [&](const Chunk& c) { return number(c.at(bodies.step).reaction); });
+  };
+  Reaction total;
+  for (int k = 0; k < bodies.servos; ++k) {
+    total.force[k] = sum([k](const Reaction& r) { return r.force[k]; });
+    if (bed.uses.damping_ledger()) total.damping[k] = sum([k](const Reaction& r) { return r.damping[k]; });
+  }
+  if (bed.uses.damping_ledger()) total.damping_power = sum([](const Reaction& r) { return r.damping_power; });
+  return total;
+}
+
+double sum_slip(const Bed& bed, std::int64_t step) {
+  return sum_over_chunks(bed.chunks, [step](const Chunk& c) { return c.at(step).slip; });
+}
+
+double pending_slip(const Bed& bed) {
+  return sum_over_chunks(bed.chunks, [&](const Chunk& c) {
+    ChunkSum slip;
+    for (Index i = c.begin; i < c.end; ++i) slip.add(i, bed.load.data()[i].slip);
+    return slip.total();
+  });
+}
+
+double fastest(const Bed& bed, const BodyMotion& bodies) {
+  double v2[3] = {0, 0, 0};
+  for (const Chunk& chunk : bed.chunks)
+    for (int a = 0; a < 3; ++a) v2[a] = std::max(v2[a], chunk.at(bodies.step - 1).fastest2[a]);
+  return std::max(std::sqrt(v2[0] + v2[1] + v2[2]), bodies.fastest_plane());
+}
+
+void check_lost(Bed& bed, const BodyMotion& bodies, const std::vector<Index>& id) {
+  for (const Chunk& chunk : bed.chunks)
+    for (Index i = chunk.begin; i < chunk.end; ++i)
+      if (is_lost(bodies, bed.grain.data()[i]))
+        throw lost_grain(bed.scene, bodies, bed.grain.data()[i], id[i]);
+}
+
+}  // namespace moraine::dem

@@ -1,0 +1,96 @@
+// What the CPU's engine keeps: rows of grains, dealt into chunks, and the links between chunks.
+//
+// A chunk has one owner at a time (a thread), who alone writes its grains and its lists. Pairs belong to the
+// chunk of their lower grain. So a chunk's grains are read only by itself and by earlier chunks, and links,
+// from an earlier chunk to a later one, are the only traffic between owners: rows of grains one way, and the
+// other way the shares of pairs across chunks, in slots that the later chunk collects in a fixed order
+// (sums.hpp).
+#pragma once
+#include <array>
+#include <vector>
+
+#include "backend/host.hpp"
+#include "dem/body/motion.hpp"
+#include "dem/cpu/pair_list.hpp"
+#include "dem/sums.hpp"
+#include "dem/uses.hpp"
+
+namespace moraine::dem {
+
+// A pair within the neighbour margin, from which near pairs are drawn.
+struct Candidate {
+  Index i, j;
+  Index link;   // for pairs across chunks
+  Index place;  // in the near list, or not_near
+};
+constexpr Index not_near = -1, no_link = -1;
+
+struct PlanePair {
+  Index i;
+  std::int32_t plane;  // in BodyMotion
+  Spring<double> spring;
+};
+
+// Slots for the pairs from one chunk to another.
+struct Link {
+  Index from, to;
+  Index first, used = 0, size = 0;  // in slots
+};
+
+struct alignas(64) Chunk {
+  Index number, begin, end;
+  int owner = 0;
+  std::vector<Candidate> candidates[2];  // inside the chunk, across
+  PairList near[2], spare;
+  std::vector<PlanePair> planes;
+  std::vector<Index> incoming;  // links, by the chunk they come from
+  std::vector<Index> outgoing;
+  std::array<std::vector<Index>, most_servos> members;  // its grains in each servo's layer
+  Index lost = -1;                                      // a grain that went wrong
+
+  // What all threads read after a step. Two, for even and odd steps: a thread may be at the next step
+  // already while another still reads.
+  struct alignas(64) Tally {
+    Reaction reaction;
+    double slip = 0;                 // J, dissipated in the step
+    double fastest2[3] = {0, 0, 0};  // largest v^2 by component
+  } tally[2];
+  const Tally& at(std::int64_t step) const { return tally[step & 1]; }
+  Tally& at(std::int64_t step) { return tally[step & 1]; }
+};
+
+struct Bed {
+  Scene scene;
+  Sides sides;
+  Uses uses;
+  Index n = 0;
+  double r_max = 0, margin = 0;  // m
+  Index chunk_size = 0;
+  std::vector<Chunk> chunks;
+  std::vector<Link> links;
+  Host::Array<BodyId> part_of;
+  Host::Array<GrainRow> grain;  // n grains, then one that never touches
+  Host::Array<NowRow> now;      // viscous only
+  Host::Array<LoadRow> load;    // of the last step of advance()
+  Host::Array<LoadRow> slot;    // the first one is for lanes without a pair
+  Host::Array<Index> slot_owner;
+  Host::Array<LoadRow> damping, damping_slot;  // the viscous part of them, where the ledger asks for it
+  Host::Array<WaterRow> water;                 // with pore water only: at the last exchange, for state()
+
+  // Grains and springs of a state; neither lists nor links.
+  void load_state(const Scene& s, const State& state, const BodyMotion& bodies);
+};
+
+// Sums over the bed.
+Reaction sum_reactions(const Bed& bed, const BodyMotion& bodies);
+double sum_slip(const Bed& bed, std::int64_t step);  // J
+// Of the present step, which the motion will add up only when it comes to it; the same sums in the same
+// order.
+double pending_slip(const Bed& bed);
+// A bound on the speed of anything, m/s.
+double fastest(const Bed& bed, const BodyMotion& bodies);
+
+// Throws Error where a grain is lost.
+void check_lost(Bed& bed, const BodyMotion& bodies, const std::vector<Index>& id);
+
+}  // namespace moraine::dem

@@ -1,0 +1,148 @@
+#include "dem/cpu/lists.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <tuple>
+
+#include "dem/body/plane_contact.hpp"
+#include "dem/cpu/rows.hpp"
+
+namespace moraine::dem {
+
+namespace {
+
+constexpr int steps_near_list_should_last = 80;
+
+// Places in the near list of the candidates there were, asked for by (i, j).
+class OldPlaces {
+ public:
+  explicit OldPlaces(std::vector<Candidate> old) : old_(std::move(old)) {}
+  Index of(Index i, Index j) {
+    while (next_ < old_.size() && std::tie(old_[next_].i, old_[next_].j) < std::tie(i, j)) ++next_;
+    const bool known = next_ < old_.size() && old_[next_].i == i && old_[next_].j == j;
+    return known ? old_[next_].place : not_near;
+  }
+
+ private:
+  std::vector<Candidate> old_;  // sorted
+  std::size_t next_ = 0;
+};
+
+void lay_out_slots(Bed& bed) {
+  std::int64_t slots = 1;  // the first one is for pads
+  for (Link& link : bed.links) {
+    link.first = static_cast<Index>(slots);
+    slots += link.size;
+  }
+  if (std::max<std::int64_t>(bed.n + 1, slots) * row_bytes > std::numeric_limits<Offset>::max())
+    throw error("too many grains for one process: ", bed.n, " grains and ", slots,
+                " pairs across chunks; there is room for 67 million of each");
+  bed.slot.resize(slots), bed.slot_owner.resize(slots);
+  clear(bed.slot);
+  if (bed.uses.damping_ledger()) {
+    bed.damping_slot.resize(slots);
+    clear(bed.damping_slot);
+  }
+}
+
+void renew_pairs(Bed& bed, Chunk& chunk, int part, double near_margin) {
+  const GrainRow* const grain = bed.grain.data();
+  const Line difference = i_minus_j();
+  PairList& old = chunk.near[part];
+  PairList& list = chunk.spare;
+  list.clear();
+  std::vector<Candidate>& candidates = chunk.candidates[part];
+  for (std::size_t start = 0; start < candidates.size(); start += lanes) {
+    const int used = static_cast<int>(std::min<std::size_t>(lanes, candidates.size() - start));
+    Line lines[lanes];
+    Pack c[8];
+    for (int k = 0; k < lanes; ++k) {
+      const Candidate& q = candidates[start + std::min(k, used - 1)];
+      lines[k] = fma(difference, line(grain[q.j]), line(grain[q.i]));
+    }
+    to_columns(lines, c);
+    const Vec3<Pack> plain{c[0], c[1], c[2]}, d = nearest_image(bed.sides, plain), shift = d - plain;
+    const Pack reach = c[7] + Pack(near_margin);
+    const Pack apart = dot(d, d) - reach * reach, across = dot(shift, shift);
+    for (int k = 0; k < used; ++k) {
+      Candidate& q = candidates[start + k];
+      if (!(apart[k] < 0)) {
+        q.place = not_near;
+        continue;
+      }
+      Index target = q.j;
+      if (q.link != no_link) {
+        Link& link = bed.links[q.link];
+        target = link.first + link.used++;
+        bed.slot_owner.data()[target] = q.j;
+      }
+      const Spring<double> spring = q.place == not_near ? Spring<double>{{0, 0, 0}, 0} : old.spring(q.place);
+      q.place = list.add(q.i, q.j, target, across[k] > 0, spring);
+    }
+  }
+  list.pad(chunk.begin, bed.n, part == 1 ? 0 : chunk.begin);
+  std::swap(old, list);
+}
+
+void renew_plane_pairs(Bed& bed, Chunk& chunk, const BodyMotion& bodies, double near_margin) {
+  std::vector<PlanePair> pairs;
+  auto known = chunk.planes.begin();  // sorted by grain, then plane
+  const auto at = [](const PlanePair& p) { return std::tie(p.i, p.plane); };
+  for (Index i = chunk.begin; i < chunk.end; ++i) {
+    if (!meets_planes(bed.scene, bed.part_of.data()[i])) continue;
+    const GrainRow& g = bed.grain.data()[i];
+    for (std::int32_t k = 0; k < bodies.planes; ++k) {
+      if (!(bodies.plane[k].gap(g.x, g.r) < near_margin)) continue;
+      while (known != chunk.planes.end() && at(*known) < std::tie(i, k)) ++known;
+      const bool same = known != chunk.planes.end() && at(*known) == std::tie(i, k);
+      pairs.push_back(same ? *known : PlanePair{i, k, {{0, 0, 0}, 0}});
+    }
+  }
+  chunk.planes = std::move(pairs);
+}
+
+}  // namespace
+
+NearMargin near_margin(const Bed& bed, double speed, double moved) {
+  const double wanted = std::max(2 * speed * bed.scene.dt * steps_near_list_should_last, 1e-5 * bed.r_max);
+  return {.margin = std::min(wanted, bed.margin - moved)};
+}
+
+void find_candidates(const Host& space, Bed& bed, Neighbours<Host>& neighbours) {
+  neighbours.build(space, bed.scene, bed.grain.data(), bed.part_of.data(), bed.n, bed.r_max, bed.margin,
+                   /*half=*/true);
+  std::vector<Index> link_of(bed.chunks.size(), no_link);  // from the chunk at hand to each other
+  bed.links.clear();
+  for (Chunk& chunk : bed.chunks) chunk.incoming.clear(), chunk.outgoing.clear();
+  for (Chunk& chunk : bed.chunks) {
+    OldPlaces inside(std::exchange(chunk.candidates[0], {})), across(std::exchange(chunk.candidates[1], {}));
+    for (Index i = chunk.begin; i < chunk.end; ++i) {
+      for (std::int64_t k = neighbours.row.data()[i]; k < neighbours.row.data()[i + 1]; ++k) {
+        const Index j = neighbours.neighbour.data()[k];
+        if (j < chunk.end) {
+          chunk.candidates[0].push_back({i, j, no_link, inside.of(i, j)});
+          continue;
+        }
+        const Index to = j / bed.chunk_size;
+        if (link_of[to] == no_link) {
+          link_of[to] = static_cast<Index>(bed.links.size());
+          bed.links.push_back({chunk.number, to, 0});
+          chunk.outgoing.push_back(link_of[to]);
+          bed.chunks[to].incoming.push_back(link_of[to]);
+        }
+        ++bed.links[link_of[to]].size;
+        chunk.candidates[1].push_back({i, j, link_of[to], across.of(i, j)});
+      }
+    }
+    for (const Index l : chunk.outgoing) link_of[bed.links[l].to] = no_link;
+  }
+  lay_out_slots(bed);
+}
+
+void renew_near_pairs(Bed& bed, Chunk& chunk, const BodyMotion& bodies, double near_margin) {
+  for (const Index l : chunk.outgoing) bed.links[l].used = 0;
+  for (int part = 0; part < 2; ++part) renew_pairs(bed, chunk, part, near_margin);
+  renew_plane_pairs(bed, chunk, bodies, near_margin);
+}
+
+}  // namespace moraine::dem

@@ -1,0 +1,152 @@
+// The CPU's engine: each pair of near grains once, as many at a time as there are SIMD lanes. Its rooms:
+//
+//   bed.hpp          rows of grains, chunks, links
+//   lists.hpp        candidates and near pairs; pair_list.hpp
+//   tasks.hpp        the tasks of a step: pair_forces.cpp, body_forces.cpp, motion.cpp
+//   exchange.hpp     meeting the pore water
+//   schedule.hpp     which thread does what, when
+#include <algorithm>
+#include <memory>
+
+#include "backend/team.hpp"
+#include "dem/cpu/lists.hpp"
+#include "dem/cpu/schedule.hpp"
+#include "dem/scene_check.hpp"
+#include "dem/state_rows.hpp"
+
+namespace moraine::dem {
+
+namespace {
+
+class PairEngine final : public Engine {
+ public:
+  explicit PairEngine(int threads) : threads_wanted_(threads) { space_.threads = std::max(1, threads); }
+
+  void load(const Scene& scene, const State& state, Surroundings* surroundings) override;
+  void advance(std::int64_t steps) override;
+  State state() const override;
+  Counts counts() const override;
+  std::string describe() const override;
+  int threads() const override { return space_.threads; }
+
+ private:
+  void search();
+  void start(const Scene& scene);
+
+  const int threads_wanted_;  // 0: by the number of grains
+  Host space_;
+  Bed bed_;
+  StepTasks tasks_;
+  Control control_;
+  NearMargin near_;
+  Neighbours<Host> neighbours_;
+  std::unique_ptr<Exchange> exchange_;
+  std::unique_ptr<Schedule> schedule_;
+  std::int64_t searches_ = 0;
+  State kept_;  // what no step changes: ids, x_start, bodies that do not move
+};
+
+void PairEngine::load(const Scene& scene, const State& s, Surroundings* surroundings) {
+  check_scene(scene, s);
+  kept_ = {};
+  kept_.id = s.id, kept_.x_start = s.x_start, kept_.bodies = s.bodies;
+  // Below some 1,500 grains a thread waits longer at barriers than it works.
+  space_.threads = threads_wanted_ > 0 ? threads_wanted_ : std::clamp(s.size() / 1500, 1, available_cores());
+  control_ = {};
+  control_.bodies = motion_of(scene, s);
+  control_.water = s.water;
+  bed_ = {};
+  bed_.load_state(scene, s, control_.bodies);
+  tasks_ = tasks_for(scene);
+  exchange_ = std::make_unique<Exchange>(bed_.uses.water ? surroundings : nullptr, s.water);
+  schedule_ = std::make_unique<Schedule>(bed_, space_.threads);
+  searches_ = 0;
+  search();
+  if (!s.staggered) start(scene);
+}
+
+// First forces, and velocities half a step back.
+void PairEngine::start(const Scene& scene) {
+  BodyMotion& bodies = control_.bodies;
+  if (bed_.uses.damped)
+    for (Index i = 0; i < bed_.n; ++i) bed_.now.data()[i] = now_row(bed_.grain.data()[i]);
+  schedule_->evaluate(tasks_, bodies, 0.0);
+  const Reaction reaction = sum_reactions(bed_, bodies);
+  if (bed_.uses.water) exchange_->alone(bed_, bodies), control_.water = exchange_->reaction();
+  start_half_a_step_back(scene, reaction, reaction_at(scene, control_.water, bodies.step), bodies);
+  for (Index i = 0; i < bed_.n; ++i) {
+    LoadRow& load = bed_.load.data()[i];
+    const LoadRow whole =
+        bed_.uses.water ? with_water(scene, bodies.step, load, bed_.water.data()[i].f) : load;
+    half_step_back(scene, bed_.grain.data()[i], whole);
+    load.slip = 0;
+  }
+}
+
+void PairEngine::search() {
+  find_candidates(space_, bed_, neighbours_);
+  ++searches_;
+  control_.moved = 0;
+  near_ = near_margin(bed_, fastest(bed_, control_.bodies), 0);
+  run_team(space_.threads, [&](int t) {
+    for (std::size_t c = t; c < bed_.chunks.size(); c += space_.threads)
+      renew_near_pairs(bed_, bed_.chunks[c], control_.bodies, near_.margin);
+  });
+}
+
+void PairEngine::advance(std::int64_t steps) {
+  while (steps > 0) {
+    const Schedule::Pause pause = schedule_->run(tasks_, *exchange_, control_, near_, steps);
+    if (pause == Schedule::Pause::done) continue;
+    check_lost(bed_, control_.bodies, kept_.id);  // of which the other pauses may come, too
+    if (pause == Schedule::Pause::failed) exchange_->rethrow();
+    search();
+  }
+}
+
+State PairEngine::state() const {
+  State s = kept_;
+  BodyMotion bodies = control_.bodies;
+  if (!control_.closed) {
+    bodies.close(bed_.scene, sum_reactions(bed_, bodies),
+                 reaction_at(bed_.scene, exchange_->reaction(), bodies.step));
+    bodies.ledger.slip += pending_slip(bed_);
+  }
+  const GrainRow* const grain = bed_.grain.data();
+  for (std::int64_t i = 0; i < bed_.water.size(); ++i) s.water_force.push_back(bed_.water.data()[i].f);
+  for (Index i = 0; i < bed_.n; ++i) append_grain(s, grain[i], bed_.load.data()[i], bed_.part_of.data()[i]);
+  for (const Chunk& chunk : bed_.chunks) {
+    for (int part = 0; part < 2; ++part)
+      for (const Candidate& c : chunk.candidates[part])
+        if (c.place != not_near)
+          append_contact(s, bed_.scene, bed_.sides, grain[c.i], grain[c.j], c.i, c.j,
+                         chunk.near[part].spring(c.place));
+    for (const PlanePair& p : chunk.planes)
+      append_wall_contact(s, bed_.scene, bodies.plane[p.plane], grain[p.i], p.i, p.spring);
+  }
+  finish_state(s, bodies);
+  return s;
+}
+
+Engine::Counts PairEngine::counts() const {
+  Counts c{.candidates = neighbours_.total, .rebuilds = searches_};
+  for (const Chunk& chunk : bed_.chunks) c.near += chunk.near[0].count + chunk.near[1].count;
+  return c;
+}
+
+std::string PairEngine::describe() const {
+#if defined(__AVX2__)
+  const char* set = "AVX2";
+#elif defined(__x86_64__)
+  const char* set = "SSE2";
+#else
+  const char* set = "portable SIMD";
+#endif
+  return "cpu, " + std::to_string(space_.threads) + (space_.threads == 1 ? " thread, " : " threads, ") + set;
+}
+
+}  // namespace
+
+std::unique_ptr<Engine> make_pair_engine(int threads) { return std::make_unique<PairEngine>(threads); }
+
+}  // namespace moraine::dem

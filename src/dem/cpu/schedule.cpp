@@ -1,0 +1,273 @@
+#include "dem/cpu/schedule.hpp"
+
+#include <algorithm>
+
+#include "dem/body/plane_contact.hpp"
+#include "dem/cpu/rows.hpp"
+
+namespace moraine::dem {
+
+namespace {
+
+// A chunk costs as much to bring into another core's cache as to compute, so it changes hands only where its
+// thread is held up for longer than that.
+constexpr int turns_before_help = 300;
+constexpr int steps_between_checks = 256;
+
+void find_lost(const Bed& bed, Chunk& chunk, const BodyMotion& bodies) {
+  chunk.lost = -1;
+  for (Index i = chunk.begin; i < chunk.end && chunk.lost < 0; ++i)
+    if (is_lost(bodies, bed.grain.data()[i])) chunk.lost = i;
+}
+
+}  // namespace
+
+// One thread's part in a run.
+class Worker {
+ public:
+  Worker(Schedule& schedule, const StepTasks& tasks, Exchange& exchange, Barrier& barrier, int thread,
+         const Control& control, const NearMargin& near, std::int64_t steps)
+      : schedule_(schedule),
+        bed_(schedule.bed_),
+        tasks_(tasks),
+        exchange_(exchange),
+        barrier_(barrier),
+        buffers_(schedule.buffers_[thread]),
+        thread_(thread),
+        layer_by_stress_(bed_.scene.body(BodyId::top_layer).x.kind == Drive::Kind::stress),
+        control_(control),
+        near_(near),
+        left_(steps) {
+    for (Chunk& c : bed_.chunks)
+      if (c.owner == thread) mine_.push_back(&c);
+    std::stable_partition(mine_.begin(), mine_.end(), [&](const Chunk* c) { return others_wait_for(*c); });
+  }
+
+  Schedule::Pause run() {
+    while (left_ > 0) {
+      if (control_.stale) {
+        control_.stale = false;  // taken up again where the lists had run out
+      } else {
+        const Schedule::Pause pause = move_on();
+        if (pause != Schedule::Pause::done) return pause;
+      }
+      --left_;
+      if (!do_forces()) return Schedule::Pause::failed;
+    }
+    return Schedule::Pause::done;
+  }
+  const Control& control() const { return control_; }
+  const NearMargin& near() const { return near_; }
+  std::int64_t left() const { return left_; }
+
+ private:
+  // A chunk whose pairs are done.
+  struct Waiting {
+    Chunk* chunk;
+    LoadRow* load;
+  };
+
+  std::int64_t step() const { return control_.bodies.step; }
+  double dt() const { return bed_.scene.dt; }
+  bool exchanges_now() const { return bed_.uses.water && exchanges(bed_.scene, step()); }
+
+  bool others_wait_for(const Chunk& c) const {
+    return std::any_of(c.outgoing.begin(), c.outgoing.end(),
+                       [&](Index l) { return bed_.chunks[bed_.links[l].to].owner > thread_; });
+  }
+
+  // Grains and bodies to the next step, with the forces on them known; whether lists last there.
+  Schedule::Pause move_on() {
+    const std::int64_t n = step();
+    if (layer_by_stress_) {
+      barrier_.wait();
+      move_bodies();
+    }
+    if (!grains_are_ahead_)
+      for (Chunk* c : mine_)
+        tasks_.motion(bed_, *c,
+                      {control_.bodies, n, dt(), bed_.load.data(),
+                       exchanges(bed_.scene, n) ? bed_.water.data() : nullptr});
+    const bool check = left_ == 1 || left_ % steps_between_checks == 0;
+    if (check)
+      for (Chunk* c : mine_) find_lost(bed_, *c, control_.bodies);
+    barrier_.wait();
+    if (exchange_.has_failed(n)) return Schedule::Pause::failed;
+
+    if (!layer_by_stress_) move_bodies();
+    if (!control_.closed) control_.bodies.ledger.slip += sum_slip(bed_, n);
+    control_.closed = false;
+    if (check && std::ranges::any_of(bed_.chunks, [](const Chunk& c) { return c.lost >= 0; }))
+      return Schedule::Pause::lost;
+    return lists_last() ? Schedule::Pause::done : Schedule::Pause::search;
+  }
+  void move_bodies() {
+    control_.water = exchange_.reaction();
+    control_.close_and_advance(bed_.scene, sum_reactions(bed_, control_.bodies));
+  }
+
+  // Whether the candidates do; near lists that do not are renewed along with the forces.
+  bool lists_last() {
+    const double speed = fastest(bed_, control_.bodies);
+    control_.moved += 2 * speed * dt();
+    near_.moved += 2 * speed * dt();
+    // One step must stay in hand: a contact that opens in this step still belongs in the near list, for
+    // what its spring gives up.
+    control_.stale = !(control_.moved + 2 * speed * dt() < bed_.margin);
+    if (control_.stale) return false;
+    renew_ = !(near_.moved < near_.margin);
+    if (renew_) near_ = near_margin(bed_, speed, control_.moved);
+    return true;
+  }
+
+  // Forces of the present step, and with them the grains' way to the next one where that needs no more.
+  // False: the water failed.
+  bool do_forces() {
+    // By the threads that moved them.
+    const bool displaced = grains_are_ahead_;
+    grains_are_ahead_ = left_ > 0 && !layer_by_stress_;
+    if (exchanges_now() && !begin_exchange(displaced)) return false;
+    for (Chunk* c : mine_) take_on(*c);
+    finish_waiting();
+    renew_ = false;
+    return true;
+  }
+
+  bool begin_exchange(bool displaced) {
+    if (exchange_.stale()) {
+      displaced = false;
+      if (!exchange_.remap(bed_, control_.bodies, thread_ == 0, barrier_)) return false;
+    }
+    if (!displaced)
+      for (const Chunk* c : mine_) exchange_.displace(bed_, *c);
+    exchange_.arrive(bed_, control_.bodies, schedule_.threads_);
+    return true;
+  }
+
+  void take_on(Chunk& c) {
+    Schedule::Progress& progress = schedule_.progress_[c.number];
+    if (!progress.take(step())) return;
+    if (renew_) renew_near_pairs(bed_, c, control_.bodies, near_.margin);
+    // Loads that are asked for after this step go to their own place, all others to a buffer.
+    const Waiting w{&c, grains_are_ahead_ ? buffers_.take(bed_.chunk_size) - c.begin : bed_.load.data()};
+    for (const ChunkTask task : tasks_.at_once) task(bed_, c, {control_.bodies, step(), dt(), w.load});
+    progress.done.store(step(), std::memory_order_release);
+    if (is_ready(c))
+      complete(w);
+    else
+      waiting_.push_back(w);
+  }
+
+  // Whether all chunks that read this one's grains or send it shares have done their pairs, and the water is
+  // solved.
+  bool is_ready(const Chunk& c) const {
+    if (exchanges_now() && !exchange_.is_solved(step())) return false;
+    return std::all_of(c.incoming.begin(), c.incoming.end(), [&](Index l) {
+      return schedule_.progress_[bed_.links[l].from].done.load(std::memory_order_acquire) == step();
+    });
+  }
+
+  void complete(Waiting w) {
+    Chunk& c = *w.chunk;
+    ChunkStep at{control_.bodies, step(), dt(), w.load};
+    for (const ChunkTask task : tasks_.after_shares) task(bed_, c, at);
+    if (exchanges_now()) {
+      // To its own place where the damping's ledger or a later step may ask for it, else to a buffer.
+      const bool keep = !grains_are_ahead_ || bed_.uses.damped || bed_.scene.exchange_interval > 1;
+      WaterRow* const push = keep ? bed_.water.data() : buffers_.push.data() - c.begin;
+      exchange_.push(bed_, c, push);
+      at.push = push;
+    }
+    if (!grains_are_ahead_) return;
+    tasks_.motion(bed_, c, at);
+    // While they are in cache; the pressure of this step is solved for.
+    if (bed_.uses.water && exchanges(bed_.scene, step() + 1) && !exchange_.stale())
+      exchange_.displace(bed_, c);
+    buffers_.give_back(w.load + c.begin);
+  }
+
+  // Chunks of its own that wait for others, and where that takes long, chunks that nobody has taken on.
+  void finish_waiting() {
+    std::size_t all_taken_from = bed_.chunks.size();
+    for (SpinWait wait;;) {
+      const auto ready = std::ranges::find_if(waiting_, [&](const Waiting& w) { return is_ready(*w.chunk); });
+      if (ready != waiting_.end()) {
+        complete(*ready);
+        waiting_.erase(ready);
+        continue;
+      }
+      while (all_taken_from > 0 && schedule_.progress_[all_taken_from - 1].is_taken(step())) --all_taken_from;
+      if (waiting_.empty() && all_taken_from == 0) return;
+      wait.once();
+      if (all_taken_from > 0 && wait.turns() > turns_before_help) {
+        take_on(bed_.chunks[all_taken_from - 1]);
+        wait.start_anew();
+      }
+    }
+  }
+
+  Schedule& schedule_;
+  Bed& bed_;
+  const StepTasks& tasks_;
+  Exchange& exchange_;
+  Barrier& barrier_;
+  Schedule::Buffers& buffers_;
+  const int thread_;
+  const bool layer_by_stress_;
+  Control control_;
+  NearMargin near_;
+  std::int64_t left_;
+  bool grains_are_ahead_ = false;  // they have moved on to the next step, bodies have not
+  bool renew_ = false;             // near lists
+  std::vector<Chunk*> mine_;
+  std::vector<Waiting> waiting_;
+};
+
+LoadRow* Schedule::Buffers::take(Index rows) {
+  if (free_.empty()) {
+    all_.emplace_back().resize(rows);
+    clear(all_.back());
+    free_.push_back(all_.back().data());
+  }
+  LoadRow* const taken = free_.back();
+  free_.pop_back();
+  return taken;
+}
+
+Schedule::Schedule(Bed& bed, int threads)
+    : bed_(bed),
+      threads_(threads),
+      progress_(std::make_unique<Progress[]>(bed.chunks.size())),
+      buffers_(threads) {
+  const std::size_t chunks = bed.chunks.size();
+  for (int t = 0; t < threads; ++t)
+    for (std::size_t c = chunks * t / threads; c < chunks * (t + 1) / threads; ++c) bed.chunks[c].owner = t;
+  if (bed.uses.water)
+    for (Buffers& b : buffers_) b.push.resize(bed.chunk_size);
+}
+
+Schedule::Pause Schedule::run(const StepTasks& tasks, Exchange& exchange, Control& control, NearMargin& near,
+                              std::int64_t& steps) {
+  Barrier barrier(threads_);
+  Pause pause = Pause::done;
+  const Control start = control;
+  const NearMargin near_start = near;
+  const std::int64_t wanted = steps;
+  run_team(threads_, [&](int thread) {
+    Worker worker(*this, tasks, exchange, barrier, thread, start, near_start, wanted);
+    const Pause reason = worker.run();
+    if (thread == 0) control = worker.control(), near = worker.near(), steps = worker.left(), pause = reason;
+  });
+  return exchange.has_failed() ? Pause::failed : pause;
+}
+
+void Schedule::evaluate(const StepTasks& tasks, const BodyMotion& bodies, double dt) {
+  clear(bed_.load), clear(bed_.damping);
+  const ChunkStep at{bodies, bodies.step, dt, bed_.load.data()};
+  for (Chunk& c : bed_.chunks)
+    for (const ChunkTask task : tasks.at_once) task(bed_, c, at);
+  for (Chunk& c : bed_.chunks)
+    for (const ChunkTask task : tasks.after_shares) task(bed_, c, at);
+}
+
+}  // namespace moraine::dem
