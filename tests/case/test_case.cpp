@@ -57,8 +57,8 @@ TEST_F(CaseTest, defaults_are_those_of_the_paper) {
   EXPECT_NEAR(c.grains.radius_std * c.grains.radius_std, 8.8e-9, 1e-11);
   EXPECT_EQ(c.grains.density, 2600);
   EXPECT_EQ(c.grains.seed, 1u);
-  EXPECT_EQ(c.k_n, 1.16e9);
-  EXPECT_EQ(c.k_t, 1.16e9);
+  EXPECT_EQ(c.contact.k_n, 1.16e9);
+  EXPECT_EQ(c.contact.k_t, 1.16e9);
   EXPECT_EQ(c.gravity, 9.80665);
   EXPECT_EQ(c.stages[0].f, 0.075);
   EXPECT_EQ(c.output.series_interval, 0.05);
@@ -210,13 +210,13 @@ TEST_F(CaseTest, a_preset_sets_step_and_stiffness) {
   const Case plain = with("");
   EXPECT_EQ(plain.preset, "none");
   EXPECT_EQ(plain.softening, 1);
-  EXPECT_EQ(plain.k_n, 3e8);
+  EXPECT_EQ(plain.contact.k_n, 3e8);
   EXPECT_EQ(plain.stages[0].f, 0.075);
   for (const Preset& p : presets()) {
     const Case c = with("preset = \"" + p.name + "\"");
-    EXPECT_EQ(c.k_n, 3e8 / p.softening);
-    EXPECT_EQ(c.k_t, 2e8 / p.softening);
-    EXPECT_EQ(c.wall_k_t, 1e8 / p.softening);
+    EXPECT_EQ(c.contact.k_n, 3e8 / p.softening);
+    EXPECT_EQ(c.contact.k_t, 2e8 / p.softening);
+    EXPECT_EQ(c.wall.k_t, 1e8 / p.softening);
     EXPECT_EQ(c.stages[0].wall_gamma_n, p.wall_gamma);
     EXPECT_EQ(c.stages[0].wall_gamma_t, p.wall_gamma);
     EXPECT_EQ(c.stages[1].wall_gamma_n, 0);
@@ -225,18 +225,18 @@ TEST_F(CaseTest, a_preset_sets_step_and_stiffness) {
     EXPECT_NE(reference().find(p.evidence), std::string::npos);
   }
   const Case paper = with("preset = \"paper\"");
-  EXPECT_EQ(paper.k_n, plain.k_n);
+  EXPECT_EQ(paper.contact.k_n, plain.contact.k_n);
   EXPECT_EQ(paper.stages, plain.stages);
 }
 
 TEST_F(CaseTest, explicit_keys_override_a_preset) {
   write("[model]\npreset = \"fast\"\nsoftening = 2\nf = 0.05\n" + settle);
-  EXPECT_EQ(load().k_n, 1.16e9 / 2);
+  EXPECT_EQ(load().contact.k_n, 1.16e9 / 2);
   EXPECT_EQ(load().stages[0].f, 0.05);
-  EXPECT_EQ(load({{"model.softening", "4"}}).k_n, 1.16e9 / 4);
+  EXPECT_EQ(load({{"model.softening", "4"}}).contact.k_n, 1.16e9 / 4);
   write("[model]\npreset = \"fast\"\n" + settle, "base");
   write("extends = \"../base\"\n[model]\npreset = \"paper\"\n");
-  EXPECT_EQ(load().k_n, 1.16e9);
+  EXPECT_EQ(load().contact.k_n, 1.16e9);
 }
 
 TEST_F(CaseTest, a_resolved_preset_softens_once) {

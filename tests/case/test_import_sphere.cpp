@@ -90,8 +90,8 @@ TEST_F(ImportSphere, a_small_bed_becomes_a_case) {
     EXPECT_EQ(c.start, directory / "start.h5");
     EXPECT_EQ(c.box_x, 1);
     EXPECT_EQ(c.box_z, 2);
-    EXPECT_EQ(c.k_n, 1e7);
-    EXPECT_EQ(c.k_t, 2e7);
+    EXPECT_EQ(c.contact.k_n, 1e7);
+    EXPECT_EQ(c.contact.k_t, 2e7);
     EXPECT_EQ(c.gravity, 9.81);
     EXPECT_EQ(c.grains.density, 2600);
     ASSERT_EQ(c.stages.size(), 2u);
@@ -116,7 +116,7 @@ TEST_F(ImportSphere, a_small_bed_becomes_a_case) {
     EXPECT_EQ(s.omega[1], (dem::Vec3d{0.4, 0.5, 0.6}));
     EXPECT_EQ(s.rotation[0], (dem::Vec3d{7, 8, 9}));
     EXPECT_EQ(s.force[0], (dem::Vec3d{0, 0, 0}));
-    EXPECT_DOUBLE_EQ(s.wall_z, 0.35);
+    EXPECT_DOUBLE_EQ(s.wall_z(), 0.35);
   }
 }
 
@@ -152,7 +152,7 @@ TEST_F(ImportSphere, the_published_bed) {
   const fs::path directory = files.path() / "x";
   import_sphere(files.write("bed.bin", bytes), directory);
   const Case c = load(directory);
-  EXPECT_EQ(c.k_n, 1.16e7);
+  EXPECT_EQ(c.contact.k_n, 1.16e7);
   EXPECT_EQ(c.stages[0].mu_s, 0.6);
 
   const dem::State s = output::read_checkpoint(directory / "start.h5").state;

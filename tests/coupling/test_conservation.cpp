@@ -58,7 +58,7 @@ TEST(Pressures, AreCarriedToAnotherGrid) {
 
 TEST(OneCell, IsPressedByNoMotion) {
   WetBed bed = pressed_bed();
-  bed.scene.top_wall.drive = dem::TopWall::Drive::velocity;
+  bed.scene.body(dem::BodyId::top_wall) = dem::wall_at_rest();
   Water w = water_over(bed);
   w.top = TopSide::impermeable, w.sides = {}, w.cells = {1, 1, 1};
   EXPECT_EQ(make_pore_water(w, bed.scene, bed.state, {}, false)->stability().w_f, 0);
@@ -78,7 +78,7 @@ TEST(Momentum, OfGrainsIsTheLossOfTheWater) {
 
 TEST(Energy, OfGrainsAndWaterIsKept) {
   WetBed bed = sheared();
-  bed.scene.grain.gamma_n = bed.scene.grain.gamma_t = bed.scene.wall.gamma_n = bed.scene.wall.gamma_t = 0;
+  for (dem::ContactParameters& p : bed.scene.contact) p.gamma_n = p.gamma_t = 0;
   for (const TopSide top : {TopSide::drained, TopSide::impermeable}) {
     Water w = water_over(bed);
     w.top = top, w.k_c = 1e-10;
@@ -106,11 +106,10 @@ TEST(Energy, OfGrainsAndWaterIsKept) {
 
 TEST(RigidMotion, DisplacesNoWater) {
   WetBed bed = pressed_bed();
-  bed.scene.grain = bed.scene.wall = {1e-3, 0, 0, 0, 0, 0};
-  bed.scene.top_wall = {};
-  bed.scene.floor = false;
+  bed.scene.contact.fill(dem::LinearContact{1e-3, 0, 0, 0, 0, 0});
+  bed.scene.body(dem::BodyId::top_wall) = bed.scene.body(dem::BodyId::floor) = {};
   for (auto& v : bed.state.v) v = {0.3, -0.2, 0};
-  Water w = water_over(bed, bed.state.wall_z);
+  Water w = water_over(bed, bed.state.wall_z());
   w.sides = {}, w.top = TopSide::drained;
   WetRun run(bed, w);
   run.advance(20);  // 0.1 mm

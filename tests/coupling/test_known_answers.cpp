@@ -11,7 +11,7 @@ constexpr double step_of_stress = 1000;  // Pa, on top of 10 kPa: contacts stay 
 
 WetBed loaded(const WetBed& bed) {
   WetBed out = bed;
-  out.scene.top_wall.sigma_0 += step_of_stress;
+  out.scene.body(dem::BodyId::top_wall).z.mean += step_of_stress;
   return out;
 }
 
@@ -28,9 +28,9 @@ struct Column {
     Scene& s = bed.scene;
     s.box = {columns * d, columns * d, 1};
     s.gravity = 0;
-    s.grain = s.wall = {k_n, k_n, 20, 10, 100, 100};
+    s.contact.fill(dem::LinearContact{k_n, k_n, 20, 10, 100, 100});
     s.dt = 0.1 * std::sqrt(dem::mass(s, d / 2) / k_n);
-    s.top_wall.drive = dem::TopWall::Drive::stress, s.top_wall.mass = 1, s.top_wall.sigma_0 = sigma_0;
+    s.body(dem::BodyId::top_wall) = dem::wall_pressed_by(sigma_0, 1);
     State& state = bed.state;
     state =
         dem::make_lattice({.count = columns * columns * layers, .radius_mean = d / 2, .radius_std = 0}).state;
@@ -41,7 +41,7 @@ struct Column {
     }
     state.x_start = state.x;
     stop(state);
-    state.wall_z = height;
+    state.wall_z() = height;
     dem::sort_spatially(s, state);
     return bed;
   }
@@ -105,7 +105,7 @@ TEST(Terzaghi, ConsolidationOfGrains) {
     for (int k = 0; k < now.grid.n[2]; ++k)
       worst = std::max(worst,
                        std::abs(now.pressure[k] / step_of_stress - terzaghi((k + 0.5) / now.grid.n[2], t)));
-    const double settlement = (height - run.engine->state().wall_z) / (height * m_v * step_of_stress);
+    const double settlement = (height - run.engine->state().wall_z()) / (height * m_v * step_of_stress);
     std::printf("T = %.2f: largest error of p %.4f of p0, settlement %.4f (%.4f)\n", t, worst, settlement,
                 terzaghi_settlement(t));
     EXPECT_LT(worst, 0.05) << "T = " << t;
@@ -120,7 +120,7 @@ struct Squeeze {
   explicit Squeeze(const WetBed& bed) {
     constexpr int layers = 10;
     const State after = at_rest(loaded(bed).scene, bed.state);
-    const double height = bed.state.wall_z;
+    const double height = bed.state.wall_z();
     z = {0}, down = {0};
     for (int layer = 0; layer < layers; ++layer) {
       std::vector<double> ways, heights;
@@ -130,7 +130,7 @@ struct Squeeze {
       // Of most grains: some are loose.
       z.push_back(median(heights)), down.push_back(median(ways));
     }
-    z.push_back(height), down.push_back(height - after.wall_z);
+    z.push_back(height), down.push_back(height - after.wall_z());
   }
   double height() const { return z.back(); }
   double at(double where) const {
@@ -210,7 +210,7 @@ TEST(Terzaghi, ConsolidationOfARandomPacking) {
       for (int c = 0; c < 4; ++c) p += now.pressure[4 * k + c] / 4;
       worst = std::max(worst, std::abs(p / step_of_stress - answer.mean_p(k, now.grid.n[2])));
     }
-    const double settlement = (height - run.engine->state().wall_z) / dry.down.back();
+    const double settlement = (height - run.engine->state().wall_z()) / dry.down.back();
     std::printf("T = %.2f: largest error of p %.4f of p0, settlement %.4f (%.4f)\n", t, worst, settlement,
                 answer.settlement());
     EXPECT_LT(worst, 0.02) << "T = " << t;
@@ -279,7 +279,7 @@ TEST(UndrainedLoading, HasSkemptonsBOfARandomPacking) {
 // The water's push of m steps comes at one: what the floor bears at that step is off by the swing.
 TEST(MeanLoads, OverAnIntervalBalance) {
   WetBed bed = Column::bed();
-  bed.scene.top_wall = {}, bed.scene.gravity = 9.81, bed.scene.fluid_density = 1000;
+  bed.scene.body(dem::BodyId::top_wall) = {}, bed.scene.gravity = 9.81, bed.scene.fluid_density = 1000;
   bed.state = at_rest(bed.scene, bed.state);
   double weight = 0;  // N, submerged
   for (const double r : bed.state.r)
@@ -378,8 +378,8 @@ TEST(CoupledStability, EnergyDoesNotGrow) {
     for (const TopSide top : {TopSide::impermeable, TopSide::drained}) {
       WetBed bed = pressed_bed();
       Scene& s = bed.scene;
-      s.grain.gamma_n = s.grain.gamma_t = s.wall.gamma_n = s.wall.gamma_t = 0;
-      s.grain.mu_s = s.grain.mu_d = s.wall.mu_s = s.wall.mu_d = 100;  // sticks
+      for (dem::ContactParameters& p : s.contact) p.gamma_n = p.gamma_t = 0;
+      for (dem::ContactParameters& p : s.contact) p.mu_s = p.mu_d = 100;  // sticks
       for (dem::Index i = 0; i < bed.state.size(); ++i)
         bed.state.v[i] = {1e-5 * std::sin(1e3 * i), 1e-5 * std::sin(2e3 * i), 1e-5 * std::sin(3e3 * i)};
       Water w = water_over(bed);
@@ -442,13 +442,12 @@ TEST(CoupledStability, AnyPermeabilityAndCompressibility) {
 TEST(FalseDivergence, OfAffineShearIsSmall) {
   const auto pressure = [](bool sheared) {
     WetBed bed = tall_bed();
-    bed.scene.grain = bed.scene.wall = {1e-6, 0, 0, 0, 0, 0};
-    bed.scene.top_wall = {};
-    bed.scene.floor = false;
+    bed.scene.contact.fill(dem::LinearContact{1e-6, 0, 0, 0, 0, 0});
+    bed.scene.body(dem::BodyId::top_wall) = bed.scene.body(dem::BodyId::floor) = {};
     const double rate = 1;
     for (dem::Index i = 0; i < bed.state.size(); ++i)
       bed.state.v[i] = {(sheared ? rate : 0) * bed.state.x[i].z, 0, sheared ? 0 : -rate * bed.state.x[i].z};
-    Water w = water_over(bed, bed.state.wall_z);
+    Water w = water_over(bed, bed.state.wall_z());
     w.sides = {};
     WetRun run(bed, w);
     run.advance(20);

@@ -29,7 +29,8 @@ double solids(const WaterFields& f) {
 WetBed one_grain(const Vec3d& x, double r) {
   WetBed bed;
   bed.scene = dem::empty_space(1e5);
-  bed.scene.box = {0.2, 0.2, 1}, bed.scene.dt = 1e-6, bed.scene.floor = true;
+  bed.scene.box = {0.2, 0.2, 1}, bed.scene.dt = 1e-6;
+  bed.scene.body(dem::BodyId::floor) = dem::floor_at(0);
   bed.state = dem::grains_at_rest({r}, {x});
   return bed;
 }

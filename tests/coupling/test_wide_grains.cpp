@@ -2,7 +2,7 @@
 #include <functional>
 
 #include "coupling/mapping.hpp"
-#include "dem/engine_parts.hpp"
+#include "dem/state_rows.hpp"
 #include "wet_scenes.hpp"
 
 namespace moraine::coupling {
@@ -50,7 +50,8 @@ WetBed strewn(const std::vector<double>& radii, const Vec3d& box, std::uint64_t 
     }
   WetBed bed;
   bed.scene = dem::empty_space(1e5);
-  bed.scene.periodic_x = bed.scene.periodic_y = bed.scene.floor = true;
+  bed.scene.periodic_x = bed.scene.periodic_y = true;
+  bed.scene.body(dem::BodyId::floor) = dem::floor_at(0);
   bed.scene.box = box, bed.scene.dt = 1e-7;
   bed.state = dem::grains_at_rest(radii, x);
   return bed;
@@ -172,7 +173,7 @@ TEST(WideGrains, FillNoMoreThanTheSpace) {
 WetBed sheared(bool damped = true) {
   WetBed bed = boulder_bed();
   if (!damped)
-    for (auto* law : {&bed.scene.grain, &bed.scene.wall}) law->gamma_n = law->gamma_t = 0;
+    for (dem::ContactParameters& p : bed.scene.contact) p.gamma_n = p.gamma_t = 0;
   for (dem::Index i = 0; i < bed.state.size(); ++i) {
     const Vec3d& x = bed.state.x[i];
     bed.state.v[i] = {2 * x.z, 0.1 * std::sin(40 * x.x), 0.1 * std::cos(30 * x.y)};
@@ -232,10 +233,10 @@ TEST(WideGrains, KeepEnergyWithTheWater) {
 
 TEST(WideGrains, DisplaceNoWaterInRigidMotion) {
   WetBed bed = boulder_bed();
-  bed.scene.grain = bed.scene.wall = {1e-3, 0, 0, 0, 0, 0};
-  bed.scene.top_wall = {}, bed.scene.floor = false;
+  bed.scene.contact.fill(dem::LinearContact{1e-3, 0, 0, 0, 0, 0});
+  bed.scene.body(dem::BodyId::top_wall) = bed.scene.body(dem::BodyId::floor) = {};
   for (auto& v : bed.state.v) v = {0.3, -0.2, 0};
-  Water w = water_over(bed, bed.state.wall_z);
+  Water w = water_over(bed, bed.state.wall_z());
   w.sides = {}, w.top = TopSide::drained;
   WetRun run(bed, w);
   run.advance(20);
@@ -245,8 +246,8 @@ TEST(WideGrains, DisplaceNoWaterInRigidMotion) {
 TEST(WideGrains, SwingStably) {
   WetBed bed = boulder_bed();
   Scene& s = bed.scene;
-  s.grain.gamma_n = s.grain.gamma_t = s.wall.gamma_n = s.wall.gamma_t = 0;
-  s.grain.mu_s = s.grain.mu_d = s.wall.mu_s = s.wall.mu_d = 100;
+  for (dem::ContactParameters& p : s.contact) p.gamma_n = p.gamma_t = 0;
+  for (dem::ContactParameters& p : s.contact) p.mu_s = p.mu_d = 100;
   for (dem::Index i = 0; i < bed.state.size(); ++i)
     bed.state.v[i] = {1e-5 * std::sin(1e3 * i), 1e-5 * std::sin(2e3 * i), 1e-5 * std::sin(3e3 * i)};
   Water w = water_over(bed);
@@ -265,7 +266,7 @@ TEST(WideGrains, GiveTheSameBitsForAnyThreadsAndAfterARestart) {
     std::vector<double> all = w.q;
     for (const auto* list : {&s.x, &s.v, &s.water_force})
       for (const Vec3d& v : *list) all.insert(all.end(), {v.x, v.y, v.z});
-    all.insert(all.end(), {s.ledger.water, s.wall_z, w.drained_top});
+    all.insert(all.end(), {s.ledger.water, s.wall_z(), w.drained_top});
     return all;
   };
   for (const int m : {1, 2}) {

@@ -17,7 +17,7 @@ struct WetBed {
 
 inline void stop(State& s) {
   for (auto* v : {&s.v, &s.omega, &s.rotation}) std::fill(v->begin(), v->end(), Vec3d{0, 0, 0});
-  s.wall_v = 0, s.step = 0, s.ledger = {};
+  s.at(dem::BodyId::top_wall).v.z = 0, s.step = 0, s.ledger = {};
 }
 
 inline double bed_top(const State& s) {
@@ -64,8 +64,8 @@ inline WetBed make_bed(int count, int columns, double normal_stress, double boul
   WetBed bed;
   Scene& s = bed.scene;
   s.box = {lattice.box_x, lattice.box_y, 1};
-  s.grain = s.wall = {1e6, 1e6, 50, 20, 0.3, 0.3};
-  s.dt = 0.1 * std::sqrt(dem::mass(s, 0.008) / s.grain.k_n);
+  s.contact.fill(dem::LinearContact{1e6, 1e6, 50, 20, 0.3, 0.3});
+  s.dt = 0.1 * std::sqrt(dem::mass(s, 0.008) / s.with(dem::Material::grain).k_n);
   State state = boulders > 0 ? with_boulders(lattice.state, boulders, lattice.box_x) : lattice.state;
   dem::sort_spatially(s, state);
   const auto engine = dem::make_engine(dem::Backend::cpu, 1);
@@ -74,13 +74,14 @@ inline WetBed make_bed(int count, int columns, double normal_stress, double boul
   stop(state);
   if (normal_stress > 0) {
     s.gravity = 0;
-    s.top_wall.drive = dem::TopWall::Drive::stress, s.top_wall.mass = 5, s.top_wall.sigma_0 = normal_stress;
-    s.grain.mu_s = s.grain.mu_d = 0.1;  // packs more closely, and hardly slides later
-    state.wall_z = bed_top(state);
+    s.body(dem::BodyId::top_wall) = dem::wall_pressed_by(normal_stress, 5);
+    s.with(dem::Material::grain).mu_s = s.with(dem::Material::grain).mu_d =
+        0.1;  // packs more closely, and hardly slides later
+    state.wall_z() = bed_top(state);
     state = dem::run(*engine, s, state, 60000);
     dem::synchronise(s, state);
     // Locked, so that it is elastic and comes to rest: sliding contacts creep for long.
-    s.grain.mu_s = s.grain.mu_d = s.wall.mu_s = s.wall.mu_d = 100;
+    for (dem::ContactParameters& p : s.contact) p.mu_s = p.mu_d = 100;
     state = at_rest(s, state);
   }
   dem::sort_spatially(s, state);
@@ -112,7 +113,7 @@ inline const WetBed& heavy_bed() {  // settled, without a wall
 inline Water water_over(const WetBed& bed, double height = 0) {
   Water w;
   w.present = true;
-  const double h = 0.05, z = height > 0 ? height : bed.state.wall_z;
+  const double h = 0.05, z = height > 0 ? height : bed.state.wall_z();
   w.cells = {std::max(1, static_cast<int>(bed.scene.box.x / h)),
              std::max(1, static_cast<int>(bed.scene.box.y / h)), std::max(1, static_cast<int>(z / h))};
   w.height = height;

@@ -1,15 +1,18 @@
 // The contact law by itself.
 #include <random>
 
-#include "dem/contact.hpp"
-#include "dem/engine_parts.hpp"
+#include "dem/body/plane_contact.hpp"
 #include "physics/scenes.hpp"
 
 namespace moraine::dem {
 namespace {
 
-constexpr Features plain{true, false, false, true}, softening{true, false, true, true},
-    viscous{true, true, false, true}, everything{true, true, true, true};
+using Smooth = Linear<Frictionless, Undamped>;
+using SmoothViscous = Linear<Frictionless, Viscosity>;
+using Plain = Linear<Coulomb, Undamped>;
+using Softening = Linear<SofteningCoulomb, Undamped>;
+using Viscous = Linear<Coulomb, Viscosity>;
+constexpr Account energy = Account::energy;
 constexpr double k = 1e5, r = 0.01;
 
 class Random {
@@ -41,10 +44,10 @@ Input any_input(Random& random) {
   return q;
 }
 
-template <Features F>
+template <class L>
 void expect_lanes_equal_doubles() {
   Random random(11);
-  const ContactParameters law{k, 0.7 * k, 5, 3, 0.5, 0.4};
+  const ContactParameters law = LinearContact{k, 0.7 * k, 5, 3, 0.5, 0.4};
   const double dt = 1e-5;
   for (int round = 0; round < 500; ++round) {
     Input q[4];
@@ -66,12 +69,12 @@ void expect_lanes_equal_doubles() {
     Spring<Pack> spring{vectors([](const Input& i) { return i.spring.delta_t; }),
                         lanes([](const Input& i) { return i.spring.slipping; })};
     const Action<Pack> a =
-        contact_law<F, Pack>(law, dt, g, motion(&Input::before), motion(&Input::now), spring);
+        contact_law<L, energy>(law, dt, g, motion(&Input::before), motion(&Input::now), spring);
 
     for (int l = 0; l < 4; ++l) {
       Spring<double> s = q[l].spring;
       const auto g1 = between_grains(q[l].x, q[l].r_i + q[l].r_j, q[l].r_i - q[l].r_j);
-      const Action<double> b = contact_law<F>(law, dt, g1, q[l].before, q[l].now, s);
+      const Action<double> b = contact_law<L, energy>(law, dt, g1, q[l].before, q[l].now, s);
       const double got[] = {a.f.x[l],
                             a.f.y[l],
                             a.f.z[l],
@@ -91,24 +94,24 @@ void expect_lanes_equal_doubles() {
 }
 
 TEST(ContactLaw, LanesOfAPackGiveTheBitsOfDoubles) {
-  expect_lanes_equal_doubles<plain>();
-  expect_lanes_equal_doubles<softening>();
-  expect_lanes_equal_doubles<viscous>();
-  expect_lanes_equal_doubles<everything>();
-  expect_lanes_equal_doubles<Features{false, false, false, true}>();
-  expect_lanes_equal_doubles<Features{false, true, false, true}>();
+  expect_lanes_equal_doubles<Plain>();
+  expect_lanes_equal_doubles<Softening>();
+  expect_lanes_equal_doubles<Viscous>();
+  expect_lanes_equal_doubles<GeneralLaw>();
+  expect_lanes_equal_doubles<Smooth>();
+  expect_lanes_equal_doubles<SmoothViscous>();
 }
 
 // Whatever moves: no pull, no more friction than mu_s allows, no force and no memory when open, no negative
 // slip.
 TEST(ContactLaw, StaysWithinItsLimits) {
   Random random(12);
-  const ContactParameters law{k, 0.7 * k, 5, 3, 0.5, 0.4};
+  const ContactParameters law = LinearContact{k, 0.7 * k, 5, 3, 0.5, 0.4};
   for (int round = 0; round < 20000; ++round) {
     const Input q = any_input(random);
     const auto g = between_grains(q.x, q.r_i + q.r_j, q.r_i - q.r_j);
     Spring<double> s = q.spring;
-    const Action<double> a = contact_law<everything>(law, 1e-5, g, q.before, q.now, s);
+    const Action<double> a = contact_law<GeneralLaw, energy>(law, 1e-5, g, q.before, q.now, s);
     const double f_n = dot(a.f, g.n);
     const Vec3d f_t = a.f - f_n * g.n;
     EXPECT_GE(f_n, -1e-12);
@@ -129,12 +132,13 @@ TEST(ContactLaw, OpenPairsDissipateNothing) {
     Input q = any_input(random);
     q.spring = {{0, 0, 0}, 0};
     const auto g = between_grains(1.05 * q.x, q.r_i + q.r_j, q.r_i - q.r_j);
-    ASSERT_EQ(contact_law<plain>({k, k, 0, 0, 0.5, 0.5}, 1e-5, g, q.before, q.now, q.spring).slip, 0);
+    const ContactParameters law = LinearContact{k, k, 0, 0, 0.5, 0.5};
+    ASSERT_EQ((contact_law<Plain, energy>(law, 1e-5, g, q.before, q.now, q.spring).slip), 0);
   }
 }
 
 // Two grains held at a constant overlap, one pulled sideways at a constant speed.
-template <Features F>
+template <class L>
 std::vector<double> pulled_sideways(const ContactParameters& law, double overlap, double step_length,
                                     int steps) {
   const auto g = between_grains(Vec3d{0, 0, 2 * r - overlap}, 2 * r, 0.0);
@@ -144,13 +148,14 @@ std::vector<double> pulled_sideways(const ContactParameters& law, double overlap
   held.curvature = 0;  // no turning: a plane test
   Spring<double> s{{0, 0, 0}, 0};
   std::vector<double> f_t;
-  for (int step = 0; step < steps; ++step) f_t.push_back(-contact_law<F>(law, dt, held, m, m, s).f.x);
+  for (int step = 0; step < steps; ++step) f_t.push_back(-contact_law<L, energy>(law, dt, held, m, m, s).f.x);
   return f_t;
 }
 
 TEST(ContactLaw, SticksThenSlips) {
   const double overlap = 1e-4, f_n = k * overlap;
-  const std::vector<double> f = pulled_sideways<plain>({k, k, 0, 0, 0.3, 0.3}, overlap, 1e-7, 1000);
+  const std::vector<double> f =
+      pulled_sideways<Plain>(LinearContact{k, k, 0, 0, 0.3, 0.3}, overlap, 1e-7, 1000);
   for (std::size_t step = 0; step < f.size(); ++step)
     EXPECT_NEAR(f[step], std::min(k * 1e-7 * (step + 1.0), 0.3 * f_n), 1e-12 * f_n);
 }
@@ -159,8 +164,8 @@ TEST(ContactLaw, SticksThenSlips) {
 // mu_s again.
 TEST(ContactLaw, SoftensWhenItSlips) {
   const double overlap = 1e-4, f_n = k * overlap;
-  const ContactParameters law{k, k, 0, 0, 0.5, 0.3};
-  const std::vector<double> f = pulled_sideways<softening>(law, overlap, 1e-7, 2000);
+  const ContactParameters law = LinearContact{k, k, 0, 0, 0.5, 0.3};
+  const std::vector<double> f = pulled_sideways<Softening>(law, overlap, 1e-7, 2000);
   const auto peak = std::max_element(f.begin(), f.end());
   EXPECT_NEAR(*peak, 0.5 * f_n, k * 1e-7);
   for (auto later = peak + 1; later != f.end(); ++later) EXPECT_NEAR(*later, 0.3 * f_n, 1e-12 * f_n);
@@ -171,7 +176,7 @@ TEST(ContactLaw, SoftensWhenItSlips) {
   const auto moving = [](double v) { return Motion<double>{{v, 0, 0}, {0, 0, 0}, {0, 0, 0}}; };
   Spring<double> s{{0, 0, 0}, 0};
   const auto pull = [&](double v) {
-    return -contact_law<softening>(law, dt, g, moving(v), moving(v), s).f.x;
+    return -contact_law<Softening, energy>(law, dt, g, moving(v), moving(v), s).f.x;
   };
   for (int step = 0; step < 1000; ++step) pull(0.01);
   EXPECT_EQ(s.slipping, 1);
@@ -184,13 +189,15 @@ TEST(ContactLaw, SoftensWhenItSlips) {
 
 TEST(ContactLaw, ViscousWallWithoutSpring) {
   const double overlap = 1e-4, f_n = k * overlap;
-  const ContactParameters wall{k, 0, 0, 20, 0.3, 0.3};
+  Scene s;
+  s.with(Material::wall) = LinearContact{k, 0, 0, 20, 0.3, 0.3};
+  const Plane floor{.id = BodyId::floor};
   for (const double v : {0.01, 0.1, 0.149, 0.151, 1.0}) {
-    Spring<double> s{{0, 0, 0}, 0};
+    Spring<double> spring{{0, 0, 0}, 0};
     const GrainRow grain{{0, 0, r - overlap}, r, {v, 0, 0}, r, {0, 0, 0}, 0};
     for (int step = 0; step < 100; ++step) {  // no memory: the same at every step
       const auto a =
-          wall_action<viscous>(wall, 1e-5, Drive{}, grain, {{v, 0, 0}, 0, {0, 0, 0}, 0}, WallName::floor, s);
+          plane_action<Viscous, energy>(s, 1e-5, floor, grain, {{v, 0, 0}, 0, {0, 0, 0}, 0}, spring);
       EXPECT_NEAR(a.f.x, -std::min(20 * v, 0.3 * f_n), 1e-12 * f_n);
       EXPECT_NEAR(a.f.z, f_n, 1e-12 * f_n);
     }
@@ -199,17 +206,55 @@ TEST(ContactLaw, ViscousWallWithoutSpring) {
 
 // The same plane from below and from above.
 TEST(ContactLaw, TopWallMirrorsTheFloor) {
-  const ContactParameters wall{k, k, 5, 3, 0.3, 0.3};
+  Scene s;
+  s.with(Material::wall) = LinearContact{k, k, 5, 3, 0.3, 0.3};
   Spring<double> below{{0, 0, 0}, 0}, above{{0, 0, 0}, 0};
-  Drive drive{};
-  drive.wall_z = 1;
+  const Plane floor{.id = BodyId::floor}, top{.id = BodyId::top_wall, .facing = -1, .place = 1};
   const Vec3d v{0.1, -0.2, -0.05}, omega{3, 4, 5};
   const GrainRow low{{0, 0, 0.99 * r}, r, v, r, omega, 0};
   const Vec3d v_up{v.x, v.y, -v.z}, omega_up{-omega.x, -omega.y, omega.z};
   const GrainRow high{{0, 0, 1 - 0.99 * r}, r, v_up, r, omega_up, 0};
-  const auto a = wall_action<viscous>(wall, 1e-5, drive, low, {v, 0, omega, 0}, WallName::floor, below);
-  const auto b = wall_action<viscous>(wall, 1e-5, drive, high, {v_up, 0, omega_up, 0}, WallName::top, above);
+  const auto a = plane_action<Viscous, energy>(s, 1e-5, floor, low, {v, 0, omega, 0}, below);
+  const auto b = plane_action<Viscous, energy>(s, 1e-5, top, high, {v_up, 0, omega_up, 0}, above);
   EXPECT_LT(length(b.f - Vec3d{a.f.x, a.f.y, -a.f.z}), 1e-12 * length(a.f));
+}
+
+// A side wall is a floor that stands upright: all turns with it.
+TEST(ContactLaw, PlanesAreAlikeAlongEveryAxis) {
+  Scene s;
+  s.with(Material::wall) = LinearContact{k, k, 5, 3, 0.3, 0.3};
+  const Vec3d v{0.1, -0.2, -0.05}, omega{3, 4, 5}, plane_v{0.01, 0.02, 0};
+  const auto action = [&](int axis, double facing) {
+    const auto turned = [&](const Vec3d& a) {  // from normal z to normal `axis`
+      Vec3d out{};
+      for (int k = 0; k < 3; ++k) out[(k + axis + 1) % 3] = a[k];
+      return out;
+    };
+    const Plane plane{.id = BodyId::x_low,
+                      .axis = axis,
+                      .facing = facing,
+                      .place = 0.5,
+                      .v = turned(plane_v),
+                      .v_ahead = turned(plane_v)};
+    Spring<double> spring{turned({1e-6, 2e-6, 0}), 0};
+    const GrainRow grain{turned({0.3, 0.4, 0.5 + facing * 0.99 * r}), r, turned(v), r, turned(omega), 0};
+    const auto a = plane_action<Viscous, energy>(s, 1e-5, plane, grain, {grain.v, 0, grain.omega, 0}, spring);
+    const auto back = [&](const Vec3d& b) {
+      Vec3d out{};
+      for (int k = 0; k < 3; ++k) out[k] = b[(k + axis + 1) % 3];
+      return out;
+    };
+    return std::array{back(a.f), back(a.torque), back(spring.delta_t)};
+  };
+  for (const double facing : {1.0, -1.0}) {
+    const auto level = action(2, facing);
+    EXPECT_GT(facing * level[0].z, 0);
+    for (const int axis : {0, 1}) {
+      const auto upright = action(axis, facing);
+      for (int q = 0; q < 3; ++q)
+        EXPECT_LT(length(upright[q] - level[q]), 1e-13 * length(level[q])) << axis << ' ' << q;
+    }
+  }
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // What an engine refuses, and how it says so.
 #include "backends.hpp"
+#include "dem/sums.hpp"
 #include "error.hpp"
 #include "physics/scenes.hpp"
 
@@ -25,7 +26,7 @@ class EngineErrors : public OnEveryBackend {
 Scene good() {
   Scene s;
   s.box = {0.1, 0.1, 1};
-  s.grain.k_n = s.grain.k_t = s.wall.k_n = s.wall.k_t = 1e5;
+  for (ContactParameters& p : s.contact) p.k_n = p.k_t = 1e5;
   s.dt = 1e-5;
   return s;
 }
@@ -46,10 +47,28 @@ TEST_P(EngineErrors, Scenes) {
   EXPECT_NO_THROW(engine->load(s, two()));
   s = good(), s.periodic_z = true;
   expect_error(s, two(), {"periodic", "floor"});
-  s = good(), s.top_wall.drive = TopWall::Drive::stress;
+  s = good(), s.body(BodyId::top_wall) = wall_pressed_by(1000, 0);
   expect_error(s, two(), {"top wall mass", "positive"});
-  s = good(), s.shear.drive = Shear::Drive::stress;
+  s = good(), drive_top_layer(s, Drive::by(1000));
   expect_error(s, two(), {"top layer"});
+}
+
+TEST_P(EngineErrors, Bodies) {
+  const auto expect = [&](auto&& change, std::initializer_list<const char*> words) {
+    Scene s = good();
+    change(s);
+    expect_error(s, two(), words);
+  };
+  expect([](Scene& s) { s.body(BodyId::x_low) = plane(0, 1); }, {"periodic along x", "the side wall x_low"});
+  expect([](Scene& s) { s.body(BodyId::floor).z = Drive::by(1000); }, {"the floor", "stress", "top wall"});
+  expect([](Scene& s) { s.body(BodyId::floor).x.kind = Drive::Kind::free; }, {"the floor", "free along x"});
+  expect(
+      [](Scene& s) {
+        s.body(BodyId::top_layer) = layer(Drive::at(1), true), s.body(BodyId::top_layer).y = Drive::at(1);
+      },
+      {"layer", "along x only"});
+  expect([](Scene& s) { drive_top_layer(s, {}), s.body(BodyId::bottom_layer).x = Drive::by(1000); },
+         {"top layer only"});
 }
 
 // Something around the grains that fails at some exchange.
@@ -61,9 +80,9 @@ struct Failing : Surroundings {
 
   Failing(int exchange, bool remap) : at(exchange), in_remap(remap) {}
   bool stale() const override { return in_remap && exchanges >= at; }
-  void remap(const GrainRow*, const Drive&) override { throw error("no remap"); }
+  void remap(const GrainRow*, const BodyMotion&) override { throw error("no remap"); }
   void displace(Index, const GrainRow*) override {}
-  WaterReaction solve(const Drive&, double) override {
+  WaterReaction solve(const BodyMotion&, double) override {
     if (++exchanges >= at && !in_remap) throw error("no solution");
     return {};
   }
@@ -114,17 +133,17 @@ TEST_P(EngineErrors, FellThroughTheFloor) {
   s.v[0].z = -1e4;  // ten radii in a step
   Scene scene = good();
   expect_error(scene, s, {"grain 0 at step 1 ", "fell through the floor"}, 1);
-  scene.grain.k_n = scene.wall.k_n = 1;  // too soft to stop it
+  for (ContactParameters& p : scene.contact) p.k_n = 1;  // too soft to stop it
   s.v[0].z = -10;
   expect_error(scene, s, {"grain 0 at step", "fell through the floor"}, 1000);
 }
 
 TEST_P(EngineErrors, PassedThroughTheTopWall) {
   State s = two();
-  s.wall_z = 0.05;
+  s.wall_z() = 0.05;
   s.v[0].z = 1e4;
   Scene scene = good();
-  scene.top_wall.drive = TopWall::Drive::velocity;
+  scene.body(BodyId::top_wall) = wall_at_rest();
   expect_error(scene, s, {"grain 0 at step 1 ", "passed through the top wall"}, 1);
 }
 

@@ -32,13 +32,13 @@ void expect_all_pairs(const Case& c, std::uint64_t seed) {
     for (int a = 0; a < 3; ++a) g.x[a] = uniform(-1.5, 2.5) * c.box[a];
     g.r = g.r_again = uniform(c.r_min, c.r_max);
   }
-  const std::vector<Role> role(c.n, Role::free);
+  const std::vector<BodyId> part_of(c.n, BodyId::none);
   const double margin = 0.1 * c.r_max;
   const Sides sides = Sides::of(s);
-  const SumOrder order{chunk_size(c.n)};
+  const ContactOrder order{chunk_size(c.n)};
   for (const bool half : {true, false}) {
     Neighbours<Host> lists;
-    lists.build(Host{}, s, grains.data(), role.data(), c.n, c.r_max, margin, half);
+    lists.build(Host{}, s, grains.data(), part_of.data(), c.n, c.r_max, margin, half);
     std::int64_t total = 0;
     for (Index i = 0; i < c.n; ++i) {
       std::vector<Index> expected;
@@ -112,7 +112,7 @@ TEST(Neighbours, OneGrainFarOff) {
   grains[1] = {{0.05, 0.05, 0.029}, 0.01, {}, 0.01, {}, 0, {}, 0};
   grains[2] = {{0.05, 0.05, 1e12}, 0.01, {}, 0.01, {}, 0, {}, 0};
   Neighbours<Host> lists;
-  lists.build(Host{}, s, grains.data(), std::vector<Role>(3, Role::free).data(), 3, 0.01, 1e-3, true);
+  lists.build(Host{}, s, grains.data(), std::vector<BodyId>(3, BodyId::none).data(), 3, 0.01, 1e-3, true);
   EXPECT_EQ(lists.total, 1);
 }
 

@@ -21,7 +21,7 @@ State shuffled(const State& s) {
     place[i] = k;
     out.id[k] = s.id[i], out.r[k] = s.r[i], out.x[k] = s.x[i], out.v[k] = s.v[i], out.omega[k] = s.omega[i];
     out.rotation[k] = s.rotation[i], out.force[k] = s.force[i], out.torque[k] = s.torque[i];
-    out.x_start[k] = s.x_start[i], out.role[k] = s.role[i];
+    out.x_start[k] = s.x_start[i], out.part_of[k] = s.part_of[i];
   }
   for (Contact& c : out.contacts) {
     c.i = place[c.i], c.j = place[c.j];

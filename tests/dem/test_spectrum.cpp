@@ -15,18 +15,20 @@ Scene column() {
   Scene s;
   s.box = {10 * d, 10 * d, 1};
   s.gravity = 0;
-  s.grain = s.wall = {k, k, 0, 0, 0, 0};
-  s.top_wall.drive = TopWall::Drive::velocity;
+  s.contact.fill(LinearContact{k, k, 0, 0, 0, 0});
+  s.body(BodyId::top_wall) = wall_at_rest();
   return s;
 }
 State stack(int n, double closed = overlap) {
   std::vector<Vec3d> x;
   for (int i = 0; i < n; ++i) x.push_back({d, d, r - closed + i * (d - closed)});
   State s = grains_at_rest(std::vector<double>(x.size(), r), x);
-  s.wall_z = n * d - (n + 1) * closed;
+  s.wall_z() = n * d - (n + 1) * closed;
   return s;
 }
-void stick(Scene& s) { s.grain.mu_s = s.grain.mu_d = s.wall.mu_s = s.wall.mu_d = 1e6; }
+void stick(Scene& s) {
+  for (ContactParameters& p : s.contact) p.mu_s = p.mu_d = 1e6;
+}
 
 // With the contacts that the engine finds.
 State touching(Scene s, const State& start) {
@@ -52,7 +54,7 @@ TEST(Spectrum, ChainBetweenFixedEnds) {
 // u_j = cos(q (j - 1/2)), q = (n - 1) pi/n.
 TEST(Spectrum, ChainWithFreeEnds) {
   Scene s = column();
-  s.floor = false, s.top_wall.drive = TopWall::Drive::none;
+  s.body(BodyId::floor) = s.body(BodyId::top_wall) = {};
   for (const int n : {2, 7, 40})
     expect_just_above(stiffness(s, stack(n)),
                       4 * k / mass(s, r) * std::pow(std::sin(0.5 * (n - 1) * pi / n), 2));
@@ -61,7 +63,7 @@ TEST(Spectrum, ChainWithFreeEnds) {
 // A ring through the periodic sides: u_j = (-1)^j for an even number, q = pi (n - 1)/n for an odd one.
 TEST(Spectrum, PeriodicChain) {
   Scene s = empty_space(k);
-  s.grain.mu_s = s.grain.mu_d = 0;
+  s.with(Material::grain).mu_s = s.with(Material::grain).mu_d = 0;
   s.periodic_x = true;
   for (const int n : {8, 9}) {
     s.box.x = n * (d - overlap);
@@ -76,14 +78,14 @@ TEST(Spectrum, PeriodicChain) {
 // One spring between two masses; sticking, the contact point moves by l^2/I for either as well.
 TEST(Spectrum, TwoGrainsOfUnequalMass) {
   Scene s = empty_space(k);
-  s.grain.k_t = 0.9 * k;
+  s.with(Material::grain).k_t = 0.9 * k;
   const double r1 = 0.01, r2 = 0.025, distance = r1 + r2 - overlap;
   const State pair = grains_at_rest({r1, r2}, {{0, 0, 0}, {0.6 * distance, 0, 0.8 * distance}});
   const double normal = 1 / mass(s, r1) + 1 / mass(s, r2);
   const double l1 = r1 - 0.5 * overlap, l2 = r2 - 0.5 * overlap;
   expect_just_above(stiffness(s, pair),
                     0.9 * k * (normal + l1 * l1 / inertia(s, r1) + l2 * l2 / inertia(s, r2)));
-  s.grain.mu_s = s.grain.mu_d = 0;
+  s.with(Material::grain).mu_s = s.with(Material::grain).mu_d = 0;
   expect_just_above(stiffness(s, pair), k * normal);
 }
 
@@ -93,7 +95,7 @@ TEST(Spectrum, TwoGrainsOfUnequalMass) {
 TEST(Spectrum, CubicLatticeWithRotations) {
   const int n = 4;
   Scene s = empty_space(k);
-  s.grain.mu_s = s.grain.mu_d = 0.5;
+  s.with(Material::grain).mu_s = s.with(Material::grain).mu_d = 0.5;
   const double spacing = d - overlap;
   s.box = {n * spacing, n * spacing, n * spacing};
   s.periodic_x = s.periodic_y = s.periodic_z = true;
@@ -102,17 +104,16 @@ TEST(Spectrum, CubicLatticeWithRotations) {
     x.push_back({i % n * spacing, i / n % n * spacing, i / (n * n) * spacing});
   const State lattice = grains_at_rest(std::vector<double>(x.size(), r), x);
   expect_just_above(stiffness(s, lattice), 8 * k * std::pow(0.5 * spacing, 2) / inertia(s, r));
-  s.grain.mu_s = s.grain.mu_d = 0;
+  s.with(Material::grain).mu_s = s.with(Material::grain).mu_d = 0;
   expect_just_above(stiffness(s, lattice), 4 * k / mass(s, r));
 }
 
 // Grain on the floor under a wall of mass M: m u'' = -2 k u + k w, M w'' = k u - k w.
 TEST(Spectrum, WallWithMass) {
   Scene s = column();
-  s.top_wall.drive = TopWall::Drive::stress;
   const double m = mass(s, r);
   for (const double M : {0.01 * m, m, 100 * m}) {
-    s.top_wall.mass = M;
+    s.body(BodyId::top_wall) = wall_pressed_by(0, M);
     const double trace = 2 * k / m + k / M, determinant = k * k / (m * M);
     expect_just_above(stiffness(s, stack(1)), 0.5 * (trace + std::sqrt(trace * trace - 4 * determinant)));
   }
@@ -124,10 +125,10 @@ TEST(Spectrum, WallWithMass) {
 TEST(Spectrum, LayerDrivenByStress) {
   Scene s = column();
   stick(s);
-  s.floor = false, s.top_wall.drive = TopWall::Drive::none;
-  s.shear = {Shear::Drive::stress, 0, 100, true};
+  s.body(BodyId::floor) = s.body(BodyId::top_wall) = {};
+  drive_top_layer(s, Drive::by(100), true);
   State three = stack(3);
-  three.role = {Role::bottom, Role::free, Role::top};
+  three.part_of = {BodyId::bottom_layer, BodyId::none, BodyId::top_layer};
   const double l = r - 0.5 * overlap, a = l * l * k / inertia(s, r), c = k / mass(s, r), b = std::sqrt(a * c);
   // Newton on the cubic from above its largest root.
   double root = 4 * (a + c);
@@ -160,7 +161,7 @@ TEST(Spectrum, NoContactsNoLimit) {
 double growth(Scene s, double share) {
   State start = stack(6, 1e-6);
   s.dt = share * critical_step(spectrum(s, touching(s, start)));
-  const double jolt = 1e-14 / s.dt, sideways = s.grain.mu_s > 0 ? 0.3 * jolt : 0;
+  const double jolt = 1e-14 / s.dt, sideways = s.with(Material::grain).mu_s > 0 ? 0.3 * jolt : 0;
   for (int i = 0; i < 6; ++i) {
     const double sign = i % 2 ? -1 : 1;
     start.v[i] = {sign * sideways, 0, sign * jolt};
@@ -194,13 +195,13 @@ TEST(CriticalStep, Damped) {
   Scene s = column();
   for (const double damping : {0.1, 1.0, 5.0}) {
     const double gamma = damping * std::sqrt(k * mass(s, r));
-    s.grain = s.wall = {k, k, gamma, gamma, 0, 0};
+    s.contact.fill(LinearContact{k, k, gamma, gamma, 0, 0});
     EXPECT_LT(growth(s, 0.98), 20) << damping;
     EXPECT_GT(growth(s, 1.02), 1e3) << damping;
     stick(s);
     EXPECT_LT(growth(s, 0.98), 20) << damping;
     EXPECT_GT(growth(s, 1.02), 1e3) << damping;
-    s.grain.gamma_t = s.wall.gamma_t = 0;
+    for (ContactParameters& p : s.contact) p.gamma_t = 0;
     EXPECT_LT(growth(s, 0.98), 20) << damping;
   }
 }
@@ -209,9 +210,9 @@ TEST(CriticalStep, Damped) {
 // the load goes on where it was.
 TEST(ChangeStep, IsSecondOrder) {
   Scene s = column();
-  s.top_wall = {TopWall::Drive::stress, 6 * mass(s, r), 0, 0, 0, 0, 0};
-  s.top_wall.sigma_0 = k * overlap / s.area();
-  s.top_wall.amplitude = 0.3 * s.top_wall.sigma_0, s.top_wall.frequency = 200;
+  s.body(BodyId::top_wall) = wall_pressed_by(k * overlap / s.area(), 6 * mass(s, r));
+  Drive& load = s.body(BodyId::top_wall).z;
+  load.amplitude = 0.3 * load.mean, load.frequency = 200;
   const double end = 8e-3;
   const auto height = [&](int steps) {
     const auto engine = make_engine(Backend::cpu, 1);
@@ -222,7 +223,7 @@ TEST(ChangeStep, IsSecondOrder) {
     EXPECT_DOUBLE_EQ(now.time(state.step), 0.5 * end);
     state = run(*engine, now, state, 3 * steps);
     EXPECT_NEAR(now.time(state.step), end, 1e-15);
-    return state.wall_z;
+    return state.wall_z();
   };
   std::vector<double> step, error;
   const double exact = height(64000);

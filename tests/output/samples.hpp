@@ -43,13 +43,14 @@ inline dem::State random_state(RandomNumbers& number, dem::Index n) {
     for (auto* list : {&s.x, &s.v, &s.omega, &s.rotation, &s.force, &s.torque, &s.x_start}) {
       list->push_back(number.vector());
     }
-    s.role.push_back(static_cast<dem::Role>(k % 3));
+    s.part_of.push_back(static_cast<dem::BodyId>(k % 3));
     if (k > 0) s.contacts.push_back({k - 1, k, number.vector(), static_cast<double>(k % 2)});
-    s.wall_contacts.push_back({k, dem::WallName::floor, number.vector(), 1});
+    s.wall_contacts.push_back({k, dem::BodyId::floor, number.vector(), 1});
   }
-  if (n > 0) s.wall_contacts.push_back({0, dem::WallName::top, number.vector(), 0});
-  for (double* value : {&s.wall_z, &s.wall_v, &s.wall_force, &s.shear_force, &s.layer_u, &s.ledger.slip,
-                        &s.ledger.viscous, &s.ledger.top_wall, &s.ledger.layers, &s.ledger.viscous_power}) {
+  if (n > 0) s.wall_contacts.push_back({0, dem::BodyId::top_wall, number.vector(), 0});
+  for (dem::BodyState& body : s.bodies) body = {number.vector(), number.vector(), number.vector()};
+  for (double* value :
+       {&s.ledger.slip, &s.ledger.viscous, &s.ledger.top_wall, &s.ledger.layers, &s.ledger.viscous_power}) {
     *value = number();
   }
   s.step = (std::int64_t{1} << 53) + 1;

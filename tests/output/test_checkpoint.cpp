@@ -27,10 +27,12 @@ Checkpoint sample(dem::Index grains) {
   c.scene.box = number.vector();
   c.scene.periodic_y = false;
   c.scene.dt = 1e-7 / 3;
-  c.scene.grain.mu_d = number();
-  c.scene.wall.k_n = number();
-  c.scene.top_wall.drive = dem::TopWall::Drive::velocity;
-  c.scene.shear = {dem::Shear::Drive::stress, number(), number(), true};
+  c.scene.with(dem::Material::grain).mu_d = number();
+  c.scene.with(dem::Material::wall).k_n = number();
+  c.scene.body(dem::BodyId::top_wall) = dem::top_wall();
+  c.scene.body(dem::BodyId::top_wall).z = dem::Drive::at(number());
+  c.scene.body(dem::BodyId::top_layer) = dem::layer(dem::Drive::by(number()), true);
+  c.scene.body(dem::BodyId::y_high) = dem::plane(1, -1, number());
   c.state = random_state(number, grains);
   c.scene.exchange_interval = grains > 0 ? 4 : 0;
   for (dem::Index k = 0; k < grains; ++k) {
@@ -53,7 +55,7 @@ class CheckpointFile : public testing::Test {
     return message([&] { read_checkpoint(path); });
   }
   // As if the file had been written with what now stands in it.
-  void reseal(std::int64_t format = 5) const {
+  void reseal(std::int64_t format = 6) const {
     std::string bytes = contents(path);
     seal(bytes, "checkpoint", format);
     directory.write("checkpoint.h5", bytes);
@@ -82,7 +84,7 @@ TEST_F(CheckpointFile, KeepsEveryBit) {
     EXPECT_EQ(read.case_text, written.case_text);
     EXPECT_EQ(read.state.id, written.state.id);
     EXPECT_EQ(read.state.x, written.state.x);
-    EXPECT_EQ(read.state.role, written.state.role);
+    EXPECT_EQ(read.state.part_of, written.state.part_of);
     EXPECT_EQ(read.state.step, written.state.step);
     EXPECT_EQ(read.state.water_force, written.state.water_force);
     EXPECT_EQ(read.water.cells, written.water.cells);
@@ -129,7 +131,7 @@ TEST_F(CheckpointFile, RefusesWhatIsNoCheckpoint) {
                          .force = {{}},
                          .torque = {{}},
                          .x_start = {{}},
-                         .role = {dem::Role::free}};
+                         .part_of = {dem::BodyId::none}};
   write_snapshot(directory.path(), "checkpoint", 0, {}, grain);
   EXPECT_EQ(why_not(), other);
 }
@@ -213,7 +215,7 @@ TEST_F(CheckpointFile, RefusesAnotherFormat) {
   reseal(1000);
   EXPECT_EQ(
       why_not(),
-      path.string() + ": written by a later version of moraine (checkpoint format 1000; this one reads 5)");
+      path.string() + ": written by a later version of moraine (checkpoint format 1000; this one reads 6)");
 
   directory.write("checkpoint.h5", hdf5);  // has lost its seal
   EXPECT_THROW(read_checkpoint(path), Damaged);
@@ -222,13 +224,13 @@ TEST_F(CheckpointFile, RefusesAnotherFormat) {
   EXPECT_TRUE(
       contains(why_not(), path.string() + ": written by an earlier version of moraine (checkpoint format 4"))
       << why_not();
-  EXPECT_TRUE(contains(why_not(), "this one reads 5")) << why_not();
+  EXPECT_TRUE(contains(why_not(), "this one reads 6")) << why_not();
 }
 
 // A checkpoint before it is no help where this version is the wrong one.
 TEST_F(CheckpointFile, CallsOnlyDamageDamage) {
   write_checkpoint(path, sample(2));
-  reseal(6);
+  reseal(7);
   try {
     read_checkpoint(path);
     FAIL();
@@ -267,8 +269,16 @@ TEST_F(CheckpointFile, RefusesWhatIsNoState) {
   EXPECT_TRUE(refused("between grains 1 and 3")) << why_not();
 
   write_checkpoint(path, sample(3));
-  change<std::uint8_t>("state/role", H5T_NATIVE_UINT8, {0, 3, 1});
-  EXPECT_TRUE(refused("/role: 3 is not a value from 0 to 2")) << why_not();
+  change<std::uint8_t>("state/part_of", H5T_NATIVE_UINT8, {0, 9, 1});
+  EXPECT_TRUE(refused("/part_of: 9 is not a value from 0 to 8")) << why_not();
+
+  write_checkpoint(path, sample(3));
+  change<std::uint8_t>("state/part_of", H5T_NATIVE_UINT8, {0, 3, 1});
+  EXPECT_TRUE(refused("no grain can be part of the floor")) << why_not();
+
+  write_checkpoint(path, sample(3));
+  change<std::uint8_t>("state/wall_contacts/wall", H5T_NATIVE_UINT8, {2, 3, 3, 4});
+  EXPECT_TRUE(refused("no wall contact can be with the top layer")) << why_not();
 
   write_checkpoint(path, sample(3));
   const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
@@ -276,6 +286,27 @@ TEST_F(CheckpointFile, RefusesWhatIsNoState) {
   H5Fclose(file);
   reseal();
   EXPECT_TRUE(refused("/torque: cannot open the dataset")) << why_not();
+}
+
+TEST_F(CheckpointFile, RefusesWhatIsNoScene) {
+  const auto expect_refused = [&](auto spoil, const char* part) {
+    Checkpoint c = sample(3);
+    spoil(c.scene);
+    write_checkpoint(path, c);
+    EXPECT_TRUE(contains(why_not(), path.string() + ": /scene") && contains(why_not(), part)) << why_not();
+  };
+  using dem::BodyId, dem::Scene;
+  const auto five = [](auto& choice) { choice = static_cast<std::decay_t<decltype(choice)>>(5); };
+  expect_refused([&](Scene& s) { five(s.body(BodyId::floor).shape); },
+                 "/shape: 5 is not a value from 0 to 2");
+  expect_refused([&](Scene& s) { five(s.body(BodyId::floor).material); },
+                 "/material: 5 is not a value from 0 to 1");
+  expect_refused([&](Scene& s) { five(s.body(BodyId::floor).x.kind); },
+                 "/kind: 5 is not a value from 0 to 3");
+  expect_refused([](Scene& s) { s.body(BodyId::floor) = dem::layer({}, true); }, "the floor has the shape");
+  expect_refused([](Scene& s) { s.body(BodyId::none) = dem::floor_at(0); }, "no body has the shape");
+  expect_refused([](Scene& s) { s.body(BodyId::x_low).axis = 3; }, "the side wall x_low has the axis 3");
+  expect_refused([](Scene& s) { s.body(BodyId::x_low).facing = 0; }, "the side wall x_low faces 0");
 }
 
 TEST_F(CheckpointFile, RefusesWhatIsNoWater) {

@@ -26,7 +26,7 @@ struct Bed {
     s.x_start = {{-0.55, -0.1, 1}, {0.5, -0.1, 1}, {1.4, -0.1, 0.5}};
     s.v = {{3, 0, 0}, {1, 0, 0}, {2, 0, 0}};
     s.omega = s.rotation = s.force = s.torque = std::vector<Vec3d>(3, Vec3d{0, 0, 0});
-    s.role = {dem::Role::top, dem::Role::bottom, dem::Role::free};
+    s.part_of = {dem::BodyId::top_layer, dem::BodyId::bottom_layer, dem::BodyId::none};
     s.contacts = {{0, 1, {0, 0, 0}, 0}, {0, 2, {0, 0, 0}, 0}, {1, 2, {0, 1e-9, 0}, 0}};
     s.step = 40;
   }
@@ -62,8 +62,7 @@ TEST_F(Snapshot, ListsGrainsByTheirIds) {
 
   EXPECT_EQ(read<dem::Index>(path(info), "grains", "id"), (std::vector<dem::Index>{0, 1, 2}));
   EXPECT_EQ(read<double>(path(info), "grains", "radius"), (std::vector{0.5, 0.55, 0.6}));
-  EXPECT_EQ(read<dem::Role>(path(info), "grains", "role"),
-            (std::vector{dem::Role::bottom, dem::Role::free, dem::Role::top}));
+  EXPECT_EQ(read<std::uint8_t>(path(info), "grains", "role"), (std::vector<std::uint8_t>{1, 0, 2}));
   const auto position = read<Vec3d>(path(info), "grains", "position");
   EXPECT_EQ(position[0], (Vec3d{0.5, -0.1 + 3, 1}));
   EXPECT_DOUBLE_EQ(position[2].x, 2.45);

@@ -22,13 +22,43 @@ inline double length(const Vec3d& a) { return std::sqrt(dot(a, a)); }
 inline double mass(const Scene& s, double r) { return sphere_mass(s.density, r); }
 inline double inertia(const Scene& s, double r) { return 0.4 * mass(s, r) * r * r; }
 
+// Parameters of a contact, all of which a test has to give.
+struct LinearContact {
+  double k_n, k_t;          // N/m
+  double gamma_n, gamma_t;  // N s/m
+  double mu_s, mu_d;
+
+  operator ContactParameters() const {
+    ContactParameters p;
+    p.k_n = k_n, p.k_t = k_t, p.gamma_n = gamma_n, p.gamma_t = gamma_t, p.mu_s = mu_s, p.mu_d = mu_d;
+    return p;
+  }
+};
+
+inline Body wall_at_rest() {
+  Body b = top_wall();
+  b.z = Drive::at(0);
+  return b;
+}
+inline Body wall_pressed_by(double stress, double mass) {  // Pa, kg
+  Body b = top_wall();
+  b.z = Drive::by(stress), b.mass = mass;
+  return b;
+}
+// The bottom layer stands still.
+inline void drive_top_layer(Scene& s, const Drive& along_x, bool hold_z = false) {
+  s.body(BodyId::bottom_layer) = layer({}, hold_z);
+  s.body(BodyId::top_layer) = layer(along_x, hold_z);
+}
+
 // Grains alone: no gravity, no walls, no periodic sides.
 inline Scene empty_space(double k) {
   Scene s;
   s.box = {1, 1, 1};
-  s.periodic_x = s.periodic_y = s.floor = false;
+  s.periodic_x = s.periodic_y = false;
+  s.body(BodyId::floor) = {};
   s.gravity = 0;
-  s.grain.k_n = s.grain.k_t = s.wall.k_n = s.wall.k_t = k;
+  for (ContactParameters& p : s.contact) p.k_n = p.k_t = k;
   return s;
 }
 
@@ -60,8 +90,8 @@ inline const Bed& settled_bed() {
     const Lattice lattice = make_lattice(p);
     Scene s;
     s.box = {lattice.box_x, lattice.box_y, 1};
-    s.grain = s.wall = {1e5, 1e5, 20, 8, 0.5, 0.5};
-    s.dt = 0.1 * std::sqrt(mass(s, 0.008) / s.grain.k_n);
+    s.contact.fill(LinearContact{1e5, 1e5, 20, 8, 0.5, 0.5});
+    s.dt = 0.1 * std::sqrt(mass(s, 0.008) / s.with(Material::grain).k_n);
     State state = lattice.state;
     sort_spatially(s, state);
     const auto engine = make_engine(Backend::cpu, 1);
@@ -81,11 +111,13 @@ inline Bed sheared_bed() {
   double top = 0;
   for (Index i = 0; i < state.size(); ++i) top = std::max(top, state.x[i].z + state.r[i]);
   for (Index i = 0; i < state.size(); ++i)
-    state.role[i] = state.x[i].z < 0.02 ? Role::bottom : state.x[i].z > top - 0.03 ? Role::top : Role::free;
-  state.wall_z = top;
-  s.grain.gamma_n = s.grain.gamma_t = 0;
-  s.top_wall = {TopWall::Drive::stress, 0.5, 500, 0, 0, 0, 0};
-  s.shear = {Shear::Drive::velocity, 0.2, 0, false};
+    state.part_of[i] = state.x[i].z < 0.02         ? BodyId::bottom_layer
+                       : state.x[i].z > top - 0.03 ? BodyId::top_layer
+                                                   : BodyId::none;
+  state.wall_z() = top;
+  s.with(Material::grain).gamma_n = s.with(Material::grain).gamma_t = 0;
+  s.body(BodyId::top_wall) = wall_pressed_by(500, 0.5);
+  drive_top_layer(s, Drive::at(0.2));
   return bed;
 }
 
@@ -111,8 +143,8 @@ inline Bed cloud(Index count, double side, std::uint64_t seed) {
   }
   Bed c{{}, grains_at_rest(r, x)};
   c.scene.box = {side, side, side};
-  c.scene.periodic_z = true, c.scene.floor = false, c.scene.gravity = 0;
-  c.scene.grain = c.scene.wall = {1e5, 1e5, 0, 0, 0.5, 0.5};
+  c.scene.periodic_z = true, c.scene.body(BodyId::floor) = {}, c.scene.gravity = 0;
+  c.scene.contact.fill(LinearContact{1e5, 1e5, 0, 0, 0.5, 0.5});
   c.scene.dt = 0.1 * std::sqrt(mass(c.scene, 0.006) / 1e5);
   for (Index i = 0; i < count; ++i) {
     c.state.v[i] = {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
@@ -130,7 +162,7 @@ inline void expect_same_bits(const State& a, const State& b) {
     for (std::size_t k = 0; k < p.size(); ++k)
       ASSERT_EQ(std::memcmp(&p[k], &q[k], sizeof(T)), 0) << name << "[" << k << "] differs";
   };
-  same(a.id, b.id, "id"), same(a.r, b.r, "r"), same(a.role, b.role, "role");
+  same(a.id, b.id, "id"), same(a.r, b.r, "r"), same(a.part_of, b.part_of, "part_of");
   same(a.x, b.x, "x"), same(a.v, b.v, "v"), same(a.omega, b.omega, "omega");
   same(a.rotation, b.rotation, "rotation"), same(a.force, b.force, "force"),
       same(a.torque, b.torque, "torque");
@@ -138,10 +170,9 @@ inline void expect_same_bits(const State& a, const State& b) {
   same(a.contacts, b.contacts, "contacts"), same(a.wall_contacts, b.wall_contacts, "wall_contacts");
   const auto numbers = [](const State& s) {
     const Ledger& l = s.ledger;
-    return std::vector<double>{s.wall_z, s.wall_v,  s.wall_force, s.shear_force, s.layer_u,
-                               l.slip,   l.viscous, l.top_wall,   l.layers,      l.viscous_power};
+    return std::vector<double>{l.slip, l.viscous, l.top_wall, l.layers, l.viscous_power};
   };
-  same(numbers(a), numbers(b), "wall, layer, ledger");
+  same(a.bodies, b.bodies, "bodies"), same(numbers(a), numbers(b), "ledger");
   EXPECT_EQ(a.step, b.step);
   EXPECT_EQ(a.staggered, b.staggered);
 }

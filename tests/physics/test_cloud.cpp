@@ -1,6 +1,5 @@
 // An isotropic cloud between three periodic sides, against a search of all pairs.
 #include "backends.hpp"
-#include "dem/contact.hpp"
 #include "dem/grain.hpp"
 #include "physics/scenes.hpp"
 
@@ -14,7 +13,7 @@ TEST_P(Cloud, ContactsAndForcesOfAllPairs) {
   for (const double side : {0.13, 0.065}) {  // the smaller one is less than three cells wide
     Bed bed = cloud(side > 0.1 ? 190 : 22, side, 5);
     Scene& s = bed.scene;
-    s.grain.gamma_n = s.grain.gamma_t = 2;
+    s.with(Material::grain).gamma_n = s.with(Material::grain).gamma_t = 2;
     const Sides sides = Sides::of(s);
     std::size_t most = 0;
     engine->load(s, bed.state);
@@ -37,8 +36,8 @@ TEST_P(Cloud, ContactsAndForcesOfAllPairs) {
           const State& at = bed.state;
           const Motion<double> motion{at.v[i] - at.v[j], at.omega[i], at.omega[j]};
           Spring<double> spring{{0, 0, 0}, 0};
-          const auto a =
-              contact_law<Features{true, true, false, true}>(s.grain, 0, g, motion, motion, spring);
+          const auto a = contact_law<Linear<Coulomb, Viscosity>, Account::energy>(s.with(Material::grain), 0,
+                                                                                  g, motion, motion, spring);
           force[i] += a.f, force[j] -= a.f;
           largest = std::max(largest, length(a.f));
         }

@@ -27,8 +27,8 @@ Scene periodic_box(double damping) {
   Scene s = empty_space(1e5);
   s.box = {0.2, 0.25, 0.3};
   s.periodic_x = s.periodic_y = s.periodic_z = true;
-  s.grain.gamma_n = s.grain.gamma_t = damping;
-  s.grain.mu_s = 0.5;
+  s.with(Material::grain).gamma_n = s.with(Material::grain).gamma_t = damping;
+  s.with(Material::grain).mu_s = 0.5;
   s.dt = 0.05 * std::sqrt(mass(s, 0.008) / 1e5);
   return s;
 }

@@ -11,6 +11,9 @@ struct Named {
   const char* name;
   Bed bed;
 };
+void damp_grains(Scene& s, double gamma) {
+  s.with(Material::grain).gamma_n = s.with(Material::grain).gamma_t = gamma;
+}
 const std::vector<Named>& scenes() {
   static const std::vector<Named> all = [] {
     std::vector<Named> a{{"sheared bed, damped walls", sheared_bed()},
@@ -22,15 +25,15 @@ const std::vector<Named>& scenes() {
                          {"no friction", sheared_bed()},
                          {"cloud", cloud(700, 0.2, 5)},
                          {"small box", cloud(22, 0.065, 5)}};
-    a[1].bed.scene.grain.mu_d = a[1].bed.scene.wall.mu_d = 0.3;
-    a[2].bed.scene.shear = {Shear::Drive::stress, 0, 400, false};
-    a[2].bed.scene.grain.gamma_n = a[2].bed.scene.grain.gamma_t = 5;
-    a[3].bed.scene.shear.hold_z = true;
-    a[4].bed.scene.top_wall.amplitude = 200, a[4].bed.scene.top_wall.frequency = 30;
-    a[4].bed.scene.wall.k_t = 0, a[4].bed.scene.ledger = false;
-    a[5].bed.scene.grain.gamma_n = a[5].bed.scene.grain.gamma_t = 5;
-    a[6].bed.scene.grain.mu_s = a[6].bed.scene.grain.mu_d = 0;
-    a[6].bed.scene.wall.mu_s = a[6].bed.scene.wall.mu_d = 0;
+    for (ContactParameters& p : a[1].bed.scene.contact) p.mu_d = 0.3;
+    drive_top_layer(a[2].bed.scene, Drive::by(400));
+    damp_grains(a[2].bed.scene, 5);
+    drive_top_layer(a[3].bed.scene, Drive::at(0.2), true);
+    Drive& load = a[4].bed.scene.body(BodyId::top_wall).z;
+    load.amplitude = 200, load.frequency = 30;
+    a[4].bed.scene.with(Material::wall).k_t = 0, a[4].bed.scene.ledger = false;
+    damp_grains(a[5].bed.scene, 5);
+    for (ContactParameters& p : a[6].bed.scene.contact) p.mu_s = p.mu_d = 0;
     return a;
   }();
   return all;

@@ -16,12 +16,13 @@ struct Variant {
 };
 std::vector<Variant> variants() {
   std::vector<Variant> all(5, {"slip, damped walls", sheared_bed()});
-  all[1].name = "damped grains", all[1].bed.scene.grain.gamma_n = all[1].bed.scene.grain.gamma_t = 5;
-  all[2].name = "softening", all[2].bed.scene.grain.mu_d = 0.3;
-  all[3].name = "layer driven by stress", all[3].bed.scene.shear = {Shear::Drive::stress, 0, 200, false};
+  const auto grain_of = [&](int k) -> ContactParameters& { return all[k].bed.scene.with(Material::grain); };
+  all[1].name = "damped grains", grain_of(1).gamma_n = grain_of(1).gamma_t = 5;
+  all[2].name = "softening", grain_of(2).mu_d = 0.3;
+  all[3].name = "layer driven by stress", drive_top_layer(all[3].bed.scene, Drive::by(200));
   Bed& smooth = all[4].bed;
   all[4].name = "no friction, no damping";
-  smooth.scene.grain = smooth.scene.wall = {1e5, 0, 0, 0, 0, 0};
+  smooth.scene.contact.fill(LinearContact{1e5, 0, 0, 0, 0, 0});
   for (Contact& c : smooth.state.contacts) c.delta_t = {0, 0, 0};
   for (WallContact& c : smooth.state.wall_contacts) c.delta_t = {0, 0, 0};
   return all;

@@ -46,7 +46,7 @@ Bed read_bed(const fs::path& path) {
   Bed bed{{}, grains_at_rest(r, at)};
   bed.scene.box = {box[0], box[1], box[2]};
   bed.scene.density = law[10];
-  bed.scene.grain = {k[0], k[1], 0, 0, law[4], law[4]};
+  bed.scene.contact.fill(LinearContact{k[0], k[1], 0, 0, law[4], law[4]});
   return bed;
 }
 
@@ -54,14 +54,16 @@ Bed read_bed(const fs::path& path) {
 Bed lammps_scene(const fs::path& path) {
   Bed bed = read_bed(path);
   Scene& s = bed.scene;
-  s.gravity = 9.81, s.dt = 2e-6, s.wall = s.grain;
-  s.shear = {Shear::Drive::velocity, 0.01, 0, true};
+  s.gravity = 9.81, s.dt = 2e-6;
+  drive_top_layer(s, Drive::at(0.01), true);
   double d = 0, top = 0;
   for (const double r : bed.state.r) d += 2 * r / bed.state.size();
   for (Index i = 0; i < bed.state.size(); ++i) top = std::max(top, bed.state.x[i].z + bed.state.r[i]);
   for (Index i = 0; i < bed.state.size(); ++i) {
     const double z = bed.state.x[i].z;
-    bed.state.role[i] = z < 2 * d ? Role::bottom : z > top - 2 * d ? Role::top : Role::free;
+    bed.state.part_of[i] = z < 2 * d         ? BodyId::bottom_layer
+                           : z > top - 2 * d ? BodyId::top_layer
+                                             : BodyId::none;
   }
   sort_spatially(s, bed.state);
   return bed;
@@ -114,7 +116,7 @@ class Lammps : public OnEveryBackend {
     const State ours = run(*make(), bed.scene, bed.state, steps);
     double force = 0, force_apart = 0, way = 0, apart = 0;
     for (Index i = 0; i < ours.size(); ++i) {
-      if (ours.role[i] != Role::free) continue;
+      if (ours.part_of[i] != BodyId::none) continue;
       const Index id = ours.id[i];
       const Vec3d weight{0, 0, -mass(bed.scene, ours.r[i]) * bed.scene.gravity};  // theirs is in the force
       force = std::max(force, length(ours.force[i]));

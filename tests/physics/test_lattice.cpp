@@ -12,7 +12,8 @@ Scene columns(double wall_stiffness) {
   Scene s;
   s.box = {3 * d, 3 * d, 1};
   s.gravity = 0;
-  s.grain = {k, k, 0, 0, 0.3, 0.3}, s.wall = {wall_stiffness, 0, 0, 0, 0, 0};
+  s.with(Material::grain) = LinearContact{k, k, 0, 0, 0.3, 0.3};
+  s.with(Material::wall) = LinearContact{wall_stiffness, 0, 0, 0, 0, 0};
   s.dt = 0.05 * std::sqrt(mass(s, r) / k);
   return s;
 }
@@ -25,7 +26,7 @@ State lattice(int n, double overlap, double at_wall) {
       for (int c = 0; c < 3; ++c)
         x.push_back({(c + 0.5) * d, (y + 0.5) * d, r - at_wall + z * (d - overlap)});
   State s = grains_at_rest(std::vector<double>(x.size(), r), x);
-  s.wall_z = n * d - (n - 1) * overlap - 2 * at_wall;
+  s.wall_z() = n * d - (n - 1) * overlap - 2 * at_wall;
   return s;
 }
 int layer(Index i) { return i / 9; }
@@ -38,16 +39,15 @@ TEST_P(CubicLattice, ModulusIsStiffnessOverSpacing) {
   const int n = 5;
   Scene s = columns(2 * k);
   const double m = mass(s, r);
-  s.grain.gamma_n = s.wall.gamma_n = 1.5 * std::sqrt(k * m);
-  s.top_wall = {TopWall::Drive::stress, 9 * m, 0, 0, 0, 0, 0};
+  for (ContactParameters& p : s.contact) p.gamma_n = 1.5 * std::sqrt(k * m);
   double height[2];
   State now = lattice(n, 0, 0);
   for (const int load : {0, 1}) {
-    s.top_wall.sigma_0 = load == 0 ? 1000 : 3000;  // strains of 2e-4, 6e-4
+    s.body(BodyId::top_wall) = wall_pressed_by(load == 0 ? 1000 : 3000, 9 * m);  // strains of 2e-4, 6e-4
     now = run(*engine, s, now, 12000);
     synchronise(s, now);
     now.step = 0;
-    height[load] = now.wall_z;
+    height[load] = now.wall_z();
   }
   const double modulus = 2000 / ((height[0] - height[1]) / (n * d));
   EXPECT_NEAR(modulus / (k / d), 1, 1e-9);
@@ -59,7 +59,7 @@ TEST_P(CubicLattice, CompressionWaveSpeed) {
   const auto engine = make();
   const int n = 280;
   Scene s = columns(k);
-  s.top_wall.drive = TopWall::Drive::velocity;
+  s.body(BodyId::top_wall) = wall_at_rest();
   State start = lattice(n, 1e-4, 1e-4);
   const auto hump = [&](int z) { return std::exp(-0.5 * std::pow((z - 0.5 * (n - 1)) / 8.0, 2)); };
   for (Index i = 0; i < start.size(); ++i) start.v[i].z = 0.01 * hump(layer(i));
@@ -93,7 +93,7 @@ TEST_P(CubicLattice, Frequencies) {
   const auto engine = make();
   const int n = 12;
   Scene s = columns(k);
-  s.top_wall.drive = TopWall::Drive::velocity;
+  s.body(BodyId::top_wall) = wall_at_rest();
   for (const int p : {1, 2, n}) {
     const double w = mode_frequency(s, n, p);
     s.dt = 2 * std::numbers::pi / (200.25 * w);  // ends beside a turning point, where the phase shows
@@ -112,7 +112,7 @@ TEST_P(CubicLattice, CriticalStep) {
   const auto engine = make();
   const int n = 40;
   Scene s = columns(k);
-  s.top_wall.drive = TopWall::Drive::velocity;
+  s.body(BodyId::top_wall) = wall_at_rest();
   const double critical = 2 / mode_frequency(s, n, n);
   EXPECT_NEAR(critical / std::sqrt(mass(s, r) / k), 1, 1e-3);
   const auto growth = [&](double dt) {

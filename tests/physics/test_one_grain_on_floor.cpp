@@ -2,7 +2,8 @@
 // rigid sphere knows as R; where l is constant the answers are compared with l in place, and with the
 // textbook to overlap/R.
 #include "backends.hpp"
-#include "dem/engine_parts.hpp"
+#include "dem/body/plane_contact.hpp"
+#include "dem/leapfrog.hpp"
 #include "physics/scenes.hpp"
 
 namespace moraine::dem {
@@ -14,8 +15,8 @@ class OneGrain : public OnEveryBackend {};
 
 Scene on_floor(double k, double mu) {
   Scene s = empty_space(k);
-  s.floor = true;
-  s.wall.mu_s = s.wall.mu_d = mu;
+  s.body(BodyId::floor) = floor_at(0);
+  s.with(Material::wall).mu_s = s.with(Material::wall).mu_d = mu;
   return s;
 }
 
@@ -23,7 +24,8 @@ Scene on_floor(double k, double mu) {
 TEST_P(OneGrain, BouncesOffTheFloor) {
   Scene s = on_floor(1e4, 0);
   s.gravity = 9.81;
-  const double w = std::sqrt(s.wall.k_n / mass(s, R)), h = 0.002, v1 = std::sqrt(2 * s.gravity * h);
+  const double w = std::sqrt(s.with(Material::wall).k_n / mass(s, R)), h = 0.002,
+               v1 = std::sqrt(2 * s.gravity * h);
   s.dt = 1e-3 / w;
   const double contact = 2 * (std::numbers::pi - std::atan(v1 * w / s.gravity)) / w;
   const double apex = 2 * v1 / s.gravity + contact;
@@ -51,9 +53,10 @@ TEST_P(OneGrain, SlidesThenRolls) {
   const double u0 = 0.1, mu = 0.3;
   Scene s = on_floor(1e6, mu);
   s.gravity = 9.81;
-  s.wall.gamma_t = 50;
-  s.dt = 0.02 * std::sqrt(mass(s, R) / s.wall.k_n);
-  const double sunk = mass(s, R) * s.gravity / s.wall.k_n, l = R - 0.5 * sunk, l2 = l * l / (R * R);
+  s.with(Material::wall).gamma_t = 50;
+  s.dt = 0.02 * std::sqrt(mass(s, R) / s.with(Material::wall).k_n);
+  const double sunk = mass(s, R) * s.gravity / s.with(Material::wall).k_n, l = R - 0.5 * sunk,
+               l2 = l * l / (R * R);
   const Vec3d along{0.6, 0.8, 0};
 
   const auto engine = make();
@@ -90,9 +93,10 @@ TEST_P(OneGrain, ObliqueImpactSlidesThroughout) {
   const auto engine = make();
   for (const double gamma : {0.0, 10.0}) {
     Scene s = on_floor(1e5, 0.2);
-    s.wall.gamma_n = s.wall.gamma_t =
+    s.with(Material::wall).gamma_n = s.with(Material::wall).gamma_t =
         gamma;  // gamma_t: it slides at once, where a spring alone must load first
-    const double w = std::sqrt(s.wall.k_n / mass(s, R)), v_n = 0.1, tan_theta = 3, v_t = v_n * tan_theta;
+    const double w = std::sqrt(s.with(Material::wall).k_n / mass(s, R)), v_n = 0.1, tan_theta = 3,
+                 v_t = v_n * tan_theta;
     s.dt = 1e-3 / w;
     const Vec3d along{0.6, -0.8, 0}, axis{0.8, 0.6, 0};
     State now = grains_at_rest({R}, {Vec3d{0, 0, R + 0.5 * v_n * s.dt}});
@@ -100,7 +104,7 @@ TEST_P(OneGrain, ObliqueImpactSlidesThroughout) {
     now = run(*engine, s, now, 4000);
     ASSERT_GT(now.x[0].z, R);
 
-    const double e = now.v[0].z / v_n, mu = s.wall.mu_d;
+    const double e = now.v[0].z / v_n, mu = s.with(Material::wall).mu_d;
     const double beta = 0.5 * gamma / mass(s, R), damped = std::sqrt(w * w - beta * beta);
     EXPECT_NEAR(e, std::exp(-beta / damped * std::atan2(2 * beta * damped, beta * beta - damped * damped)),
                 1e-6);
@@ -122,19 +126,19 @@ struct Incline {
   double acceleration, spin_acceleration;  // m/s2, rad/s2
 };
 Incline roll_down(double theta, double mu, double l_expected) {
-  constexpr Features features{true, false, false, true};
   constexpr double g = 9.81;
   Scene s = on_floor(1e6, mu);
   s.gravity = g * std::cos(theta);
-  s.dt = 0.02 * std::sqrt(mass(s, R) / s.wall.k_n);
+  s.dt = 0.02 * std::sqrt(mass(s, R) / s.with(Material::wall).k_n);
   const double m = mass(s, R), normal = m * s.gravity;
   // Starts as it would roll or slip for ever.
   const double share = 1 / (1 + 2.5 * l_expected * l_expected / (R * R));
   const double hold = std::min(share * m * g * std::sin(theta), mu * normal);
-  const Mobility mobility_of = mobility(s, R, Role::free);
+  const Mobility mobility_of = mobility(s, R, BodyId::none);
   const Triple dt(Vec3d{s.dt, s.dt, s.dt});
-  GrainRow grain{{0, 0, R - normal / s.wall.k_n}, R, {0, 0, 0}, R, {0, 0, 0}, 0};
-  Spring<double> spring{{hold / s.wall.k_t, 0, 0}, 0};
+  const Plane floor{.id = BodyId::floor};
+  GrainRow grain{{0, 0, R - normal / s.with(Material::wall).k_n}, R, {0, 0, 0}, R, {0, 0, 0}, 0};
+  Spring<double> spring{{hold / s.with(Material::wall).k_t, 0, 0}, 0};
   Vec3d f{-hold, 0, normal}, torque{0, l_expected * hold, 0}, rotation{0, 0, 0};
   const int steps = 5000;
   for (int step = 0; step < steps; ++step) {
@@ -143,7 +147,7 @@ Incline roll_down(double theta, double mu, double l_expected) {
     leapfrog(kinematics, a, Triple(mobility_of.spin_acceleration(torque)), dt);
     grain.x = kinematics.x, grain.v = kinematics.v, grain.omega = kinematics.omega;
     const auto action =
-        wall_action<features>(s.wall, s.dt, Drive{}, grain, NowRow{}, WallName::floor, spring);
+        plane_action<Linear<Coulomb, Undamped>, Account::energy>(s, s.dt, floor, grain, NowRow{}, spring);
     f = action.f, torque = action.torque;
   }
   const double time = steps * s.dt;

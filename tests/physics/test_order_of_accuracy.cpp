@@ -12,8 +12,9 @@ TEST_P(OrderOfAccuracy, ObliqueContact) {
   const auto engine = make();
   for (const double gamma : {0.0, 3.0}) {
     Scene s = empty_space(1e5);
-    s.grain = {1e5, 6e4, gamma, 0.5 * gamma, 100, 100};
-    const double r1 = 0.01, r2 = 0.013, w = std::sqrt(s.grain.k_n * (1 / mass(s, r1) + 1 / mass(s, r2)));
+    s.with(Material::grain) = LinearContact{1e5, 6e4, gamma, 0.5 * gamma, 100, 100};
+    const double r1 = 0.01, r2 = 0.013,
+                 w = std::sqrt(s.with(Material::grain).k_n * (1 / mass(s, r1) + 1 / mass(s, r2)));
     State start =
         grains_at_rest({r1, r2}, {Vec3d{0, 0, 0}, 0.97 * (r1 + r2) * Vec3d{1.0 / 3, 2.0 / 3, 2.0 / 3}});
     const double v = 0.02 * r1 * w;

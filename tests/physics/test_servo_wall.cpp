@@ -16,13 +16,14 @@ TEST_P(ServoWall, SwingsAtItsFrequencyAroundItsStress) {
   Scene s;
   s.box = {3 * d, 3 * d, 1};
   s.gravity = 0;
-  s.grain = s.wall = {k, k, 0, 0, 0.3, 0.3};
+  s.contact.fill(LinearContact{k, k, 0, 0, 0.3, 0.3});
   const double m = mass(s, r), q = 0.5 * std::numbers::pi / (n + 1),
                w = 2 * std::sqrt(k / m) * std::sin(0.5 * q);
-  s.top_wall = {TopWall::Drive::stress, columns * 0.5 * m, 5000, 0, 0, 0, 0};
+  const double stress = 5000;  // Pa
+  s.body(BodyId::top_wall) = wall_pressed_by(stress, columns * 0.5 * m);
   const int per_period = 1000, periods = 5;
   s.dt = 2 * std::numbers::pi / (w * per_period);
-  const double squeeze = s.top_wall.sigma_0 * s.area() / columns / k, amplitude = 0.3 * squeeze;
+  const double squeeze = stress * s.area() / columns / k, amplitude = 0.3 * squeeze;
 
   std::vector<Vec3d> x;
   for (int z = 0; z < n; ++z)
@@ -31,27 +32,27 @@ TEST_P(ServoWall, SwingsAtItsFrequencyAroundItsStress) {
                    r - squeeze + z * (d - squeeze) + amplitude * std::sin(q * (z + 1))});
   State start = grains_at_rest(std::vector<double>(x.size(), r), x);
   const double rest = n * d - (n + 1) * squeeze;
-  start.wall_z = rest + amplitude;  // sin(q (n + 1)) = 1
+  start.wall_z() = rest + amplitude;  // sin(q (n + 1)) = 1
 
   engine->load(s, start);
-  double sum = 0, crossing = 0, z_before = start.wall_z;
+  double sum = 0, crossing = 0, z_before = start.wall_z();
   int crossings = 0;
   for (int step = 1; step <= periods * per_period; ++step) {
     engine->advance(1);
     const State now = engine->state();
-    sum += now.wall_force;
-    if (z_before > rest && now.wall_z <= rest) {
+    sum += now.at(BodyId::top_wall).force.z;
+    if (z_before > rest && now.wall_z() <= rest) {
       ++crossings;
-      crossing = (step - 1 + (z_before - rest) / (z_before - now.wall_z)) * s.dt;
+      crossing = (step - 1 + (z_before - rest) / (z_before - now.wall_z())) * s.dt;
     }
-    z_before = now.wall_z;
+    z_before = now.wall_z();
   }
   // From the turning point to the last crossing: periods - 3/4. Leapfrog and interpolation: (w dt)^2/24
   // = 1.6e-6.
   ASSERT_EQ(crossings, periods);
   EXPECT_NEAR((periods - 0.75) * 2 * std::numbers::pi / (w * crossing), 1, 2e-6);
   // The wall ends where it began, so all momentum it took was the load's.
-  EXPECT_NEAR(sum / (periods * per_period) / (s.top_wall.sigma_0 * s.area()), 1, 1e-6);
+  EXPECT_NEAR(sum / (periods * per_period) / (stress * s.area()), 1, 1e-6);
 }
 
 // On a bed of grains at random, with damping, it comes to rest where the grains bear its load.
@@ -60,17 +61,18 @@ TEST_P(ServoWall, RestsOnABedAtItsStress) {
   Bed bed = settled_bed();
   Scene& s = bed.scene;
   for (Index i = 0; i < bed.state.size(); ++i)
-    bed.state.wall_z = std::max(bed.state.wall_z, bed.state.x[i].z + bed.state.r[i]);
-  s.top_wall = {TopWall::Drive::stress, 0.1, 2000, 0, 0, 0, 0};
+    bed.state.wall_z() = std::max(bed.state.wall_z(), bed.state.x[i].z + bed.state.r[i]);
+  const double stress = 2000;  // Pa
+  s.body(BodyId::top_wall) = wall_pressed_by(stress, 0.1);
   engine->load(s, bed.state);
   engine->advance(15000);
   double sum = 0;
   const int samples = 100;
   for (int k = 0; k < samples; ++k) {
     engine->advance(10);
-    sum += engine->state().wall_force;
+    sum += engine->state().at(BodyId::top_wall).force.z;
   }
-  EXPECT_NEAR(sum / samples / (s.top_wall.sigma_0 * s.area()), 1, 1e-4);
+  EXPECT_NEAR(sum / samples / (stress * s.area()), 1, 1e-4);
 }
 
 ON_EVERY_BACKEND(ServoWall);

@@ -57,18 +57,20 @@ TEST_P(StackedGrains, MoveAsCoupledOscillators) {
   const auto engine = make();
   for (const double gamma : {0.0, 4.0}) {
     Scene s = empty_space(1e5);
-    s.floor = true, s.gravity = 9.81;
-    s.wall.k_n = 7e4;
-    s.grain.gamma_n = gamma, s.wall.gamma_n = 0.5 * gamma;
-    s.top_wall.drive = TopWall::Drive::velocity;
-    const double m1 = mass(s, r1), m2 = mass(s, r2), w = std::sqrt(s.grain.k_n / m2), squeeze = 3e-4;
+    s.body(BodyId::floor) = floor_at(0), s.gravity = 9.81;
+    s.with(Material::wall).k_n = 7e4;
+    s.with(Material::grain).gamma_n = gamma, s.with(Material::wall).gamma_n = 0.5 * gamma;
+    s.body(BodyId::top_wall) = wall_at_rest();
+    const double m1 = mass(s, r1), m2 = mass(s, r2), w = std::sqrt(s.with(Material::grain).k_n / m2),
+                 squeeze = 3e-4;
     State start =
         grains_at_rest({r1, r2}, {Vec3d{0, 0, r1 - squeeze}, Vec3d{0, 0, 2 * r1 + r2 - 2 * squeeze}});
-    start.wall_z = 2 * (r1 + r2) - 3 * squeeze;
+    start.wall_z() = 2 * (r1 + r2) - 3 * squeeze;
     start.v[0].z = 0.1, start.v[1].z = -0.2;
     const double end = 40 / w;
-    const std::vector<double> exact = reference({m1, m2, s.gravity, start.wall_z, s.grain, s.wall},
-                                                {start.x[0].z, start.x[1].z, 0.1, -0.2}, end);
+    const std::vector<double> exact =
+        reference({m1, m2, s.gravity, start.wall_z(), s.with(Material::grain), s.with(Material::wall)},
+                  {start.x[0].z, start.x[1].z, 0.1, -0.2}, end);
 
     std::vector<double> z[2];
     for (const int steps : {20000, 40000}) {

@@ -1,6 +1,6 @@
 // Two grains, known answers.
 #include "backends.hpp"
-#include "dem/contact.hpp"
+#include "dem/law/laws.hpp"
 #include "physics/scenes.hpp"
 
 namespace moraine::dem {
@@ -72,7 +72,7 @@ TEST_P(TwoGrains, HeadOnDamped) {
     for (const double damping : {0.05, 0.3, 0.8, 1.5}) {  // beta/omega_0
       Scene s = empty_space(k);
       const double m = reduced_mass(s, r2), w0 = std::sqrt(k / m);
-      s.grain.gamma_n = 2 * damping * w0 * m;
+      s.with(Material::grain).gamma_n = 2 * damping * w0 * m;
       s.dt = 1e-3 / w0;
       const Collision c = collide(*engine, s, r2);
       // second order: the largest rate is w0 or 2 beta
@@ -89,25 +89,28 @@ TEST_P(TwoGrains, WhatSlipsGoesOnSlippingWhereAStageBegins) {
   const auto engine = make();
   for (const double mu_before : {0.6, 0.3}) {
     Scene s = empty_space(k);
-    s.grain.mu_s = mu_before, s.grain.mu_d = 0.3;
-    s.shear = {Shear::Drive::velocity, 0.01, 0, false};
+    s.with(Material::grain).mu_s = mu_before, s.with(Material::grain).mu_d = 0.3;
+    drive_top_layer(s, Drive::at(0.01));
     s.dt = 0.05 * std::sqrt(mass(s, r1) / k);
     // Floor, grain, grain, wall: at each contact the same overlap.
     const double overlap = 1e-3 * r1;
-    s.floor = true, s.wall.mu_s = s.wall.mu_d = 0;
-    s.top_wall = {.drive = TopWall::Drive::stress, .mass = mass(s, r1), .sigma_0 = k * overlap / s.area()};
+    s.body(BodyId::floor) = floor_at(0);
+    s.with(Material::wall).mu_s = s.with(Material::wall).mu_d = 0;
+    s.body(BodyId::top_wall) = wall_pressed_by(k * overlap / s.area(), mass(s, r1));
     State grains = grains_at_rest({r1, r1}, {{0, 0, r1 - overlap}, {0, 0, 3 * r1 - 2 * overlap}});
-    grains.role = {Role::bottom, Role::top};
-    grains.wall_z = 4 * r1 - 3 * overlap;
-    const auto friction = [&](const State& now) { return -now.shear_force / (k * overlap); };
+    grains.part_of = {BodyId::bottom_layer, BodyId::top_layer};
+    grains.wall_z() = 4 * r1 - 3 * overlap;
+    const auto friction = [&](const State& now) {
+      return -now.at(BodyId::top_layer).force.x / (k * overlap);
+    };
     // To slip takes a way of mu_s overlap.
     const auto steps = static_cast<std::int64_t>(1.5 * 0.6 * overlap / (0.01 * s.dt));
     State before = run(*engine, s, grains, steps);
     ASSERT_NEAR(friction(before), 0.3,
                 0.003);  // the normal leans by 9e-6 m in 2e-2 m
-    if (s.grain.mu_s == s.grain.mu_d) mark_slipping(s, before);
+    if (s.with(Material::grain).mu_s == s.with(Material::grain).mu_d) mark_slipping(s, before);
     synchronise(s, before);
-    s.grain.mu_s = 0.6;
+    s.with(Material::grain).mu_s = 0.6;
     double most = 0;
     engine->load(s, before);
     for (std::int64_t n = 0; n < steps; ++n) {
@@ -136,7 +139,7 @@ ON_EVERY_BACKEND(TwoGrains);
 TEST(RotatedPair, ForcesTurnWithIt) {
   using Vec3p = Vec3<Pack>;
   const double r_i = 0.012, r_j = 0.008, distance = 0.98 * (r_i + r_j), strained = 0.01 * distance;
-  const ContactParameters law{k, k, 0, 0, 1, 1};
+  const ContactParameters law = LinearContact{k, k, 0, 0, 1, 1};
   const double theta = 5e-7, dt = 1e-6;
   const auto steps = static_cast<std::int64_t>(2 * std::numbers::pi / theta);
 
@@ -166,7 +169,7 @@ TEST(RotatedPair, ForcesTurnWithIt) {
       const Vec3p v =
           Pack(2 * std::sin(0.5 * theta) / dt * distance) * cross(axis, turned(angle - 0.5 * theta));
       const Motion<Pack> motion{v, omega, omega};
-      a = contact_law<Features{true, false, false, true}, Pack>(law, dt, g, motion, motion, s);
+      a = contact_law<Linear<Coulomb, Undamped>, Account::energy>(law, dt, g, motion, motion, s);
       slip += a.slip;
     }
     const double end = static_cast<double>(steps) * theta, scale = k * strained;

@@ -23,7 +23,7 @@ class Guards : public Program {
     c.scene.box = {0.1, 0.1, 0};
     c.state = dem::grains_at_rest(std::vector<double>(x.size(), r), x);
     c.state.v = v;
-    c.state.wall_z = wall_z;
+    c.state.wall_z() = wall_z;
     const fs::path made = make("grains", R"(
 start = "start.h5"
 [contact]
@@ -184,10 +184,10 @@ TEST(Guard, NumbersThatAreNotFinite) {
   run::Stage stage{};
   stage.name = "one";
   stage.scene.dt = 1e-5;
-  stage.scene.top_wall.drive = dem::TopWall::Drive::stress;
+  stage.scene.body(dem::BodyId::top_wall) = dem::top_wall();
   dem::State good = dem::grains_at_rest({r, r}, {{0.03, 0.03, 0.02}, {0.07, 0.07, 0.02}});
   good.id = {5, 3};
-  good.wall_z = 0.1;
+  good.wall_z() = 0.1;
   const auto check = [&](const dem::State& s) {
     try {
       run::Guard({10, 0.2, 0.1}, stage, {output::Row{}}, {}).check(s);
@@ -203,9 +203,9 @@ TEST(Guard, NumbersThatAreNotFinite) {
   EXPECT_NE(check(bad).find("grain 3 at step 0 (t = 0 s) of stage one, position (0.07"), std::string::npos);
   bad = good, bad.rotation[0].z = infinity;
   EXPECT_NE(check(bad).find("grain 5 at step 0"), std::string::npos);
-  bad = good, bad.wall_v = nan;
+  bad = good, bad.at(dem::BodyId::top_wall).v.z = nan;
   EXPECT_NE(check(bad).find("top wall or driven layer at step 0"), std::string::npos);
-  bad = good, bad.wall_z = -1;
+  bad = good, bad.wall_z() = -1;
   EXPECT_NE(check(bad).find("fell through the floor"), std::string::npos);
 }
 

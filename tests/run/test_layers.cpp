@@ -52,7 +52,8 @@ TEST(Layers, OfBedsOfOneToSixDiameters) {
         continue;
       }
       const auto warnings = run::choose_layers(stage(), grains);
-      EXPECT_EQ(std::count(grains.role.begin(), grains.role.end(), dem::Role::free), 9 * (height - 2));
+      EXPECT_EQ(std::count(grains.part_of.begin(), grains.part_of.end(), dem::BodyId::none),
+                9 * (height - 2));
       ASSERT_EQ(warnings.size(), between < 3 ? 1u : 0u);
       if (between < 3) {
         EXPECT_NE(warnings[0].find("mean diameters"), std::string::npos) << warnings[0];
@@ -69,7 +70,7 @@ TEST(Layers, TheRemedyWorks) {
   const double thinner = 0.999 * std::stod(found[1]);  // as it is printed
   dem::State grains = bed_of(5);
   run::choose_layers(stage(thinner, thinner), grains);
-  EXPECT_GE(3 * std::count(grains.role.begin(), grains.role.end(), dem::Role::free), grains.size());
+  EXPECT_GE(3 * std::count(grains.part_of.begin(), grains.part_of.end(), dem::BodyId::none), grains.size());
 
   const std::string low = refusal(stage(), bed_of(2));
   ASSERT_TRUE(std::regex_search(low, found, std::regex("some ([0-9]+) grains"))) << low;

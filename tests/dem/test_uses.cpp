@@ -1,0 +1,106 @@
+// What a scene does not use is not compiled into its loop, and so costs nothing.
+#include "dem/uses.hpp"
+
+#include "physics/scenes.hpp"
+
+namespace moraine::dem {
+namespace {
+
+Scene with(const LinearContact& grain, const LinearContact& wall = {1e7, 0, 0, 0, 0, 0}) {
+  Scene s;
+  s.with(Material::grain) = grain, s.with(Material::wall) = wall;
+  return s;
+}
+Uses of(const LinearContact& grain, const LinearContact& wall = {1e7, 0, 0, 0, 0, 0}) {
+  return uses_of(with(grain, wall));
+}
+
+TEST(Uses, FrictionTakesBothMuAndATangentialForce) {
+  EXPECT_TRUE(of({1e7, 1e7, 0, 0, 0.5, 0.5}).friction);
+  EXPECT_FALSE(of({1e7, 1e7, 0, 0, 0, 0}).friction);
+  EXPECT_FALSE(of({1e7, 0, 0, 0, 0.5, 0.5}).friction);
+  EXPECT_TRUE(of({1e7, 0, 0, 5, 0.5, 0.5}).friction);
+  EXPECT_TRUE(of({1e7, 1e7, 0, 0, 0, 0}, {1e7, 1e7, 0, 0, 0.5, 0.5}).friction);
+}
+
+TEST(Uses, DampingTakesAViscosity) {
+  EXPECT_FALSE(of({1e7, 1e7, 0, 0, 0.5, 0.5}).damped_grains);
+  EXPECT_TRUE(of({1e7, 1e7, 5, 0, 0.5, 0.5}).damped_grains);
+  EXPECT_TRUE(of({1e7, 1e7, 0, 5, 0.5, 0.5}).damped_grains);
+}
+
+TEST(Uses, SofteningTakesASmallerDynamicFriction) {
+  EXPECT_FALSE(of({1e7, 1e7, 0, 0, 0.5, 0.5}).softening);
+  EXPECT_TRUE(of({1e7, 1e7, 0, 0, 0.5, 0.3}).softening);
+  EXPECT_FALSE(of({1e7, 0, 0, 0, 0.5, 0.3}).softening);  // no friction to soften
+}
+
+// Damped walls, as in settling, leave the pairs of grains without viscous terms.
+TEST(Uses, DampedWallsAreNoMatterOfPairs) {
+  const Uses u = of({1e7, 1e7, 0, 0, 0.5, 0.5}, {1e7, 0, 100, 0, 0, 0});
+  EXPECT_FALSE(u.damped_grains);
+  EXPECT_TRUE(u.damped);
+}
+
+TEST(Uses, OfWallsCountOnlyWhereThereAreWalls) {
+  Scene s = with({1e7, 1e7, 0, 0, 0, 0}, {1e7, 1e7, 100, 100, 0.5, 0.3});
+  s.body(BodyId::floor) = {};
+  const Uses u = uses_of(s);
+  EXPECT_FALSE(u.damped || u.friction || u.softening);
+  const auto all = [&] {
+    const Uses now = uses_of(s);
+    return now.damped && now.friction && now.softening;
+  };
+  for (const BodyId id : planes) {
+    s.body(id) = plane(2, 1);
+    EXPECT_TRUE(all()) << name_of(id);
+    s.body(id) = {};
+  }
+  drive_top_layer(s, Drive::at(1));  // layers are of grains
+  EXPECT_FALSE(uses_of(s).damped);
+}
+
+TEST(Uses, AnAccountOfDampingTakesDampingAndALedger) {
+  Scene s = with({1e7, 1e7, 5, 0, 0.5, 0.5});
+  EXPECT_TRUE(uses_of(s).damping_ledger());
+  s.ledger = false;
+  EXPECT_FALSE(uses_of(s).damping_ledger());
+  s.ledger = true, s.with(Material::grain).gamma_n = 0;
+  EXPECT_FALSE(uses_of(s).damping_ledger());
+}
+
+// The laws that a scene takes.
+struct Taken {
+  bool rubs, softens, damps, damps_at_planes, account;
+  bool operator==(const Taken&) const = default;
+};
+Taken taken_by(const Scene& s) {
+  Taken t{};
+  int times = 0;
+  with_laws(s, [&]<class Row, Account account>() {
+    using Grains = typename Row::BetweenGrains;
+    using Planes = typename Row::AtPlanes;
+    EXPECT_EQ(Grains::rubs, Planes::rubs);
+    t = {Grains::rubs, Grains::softens, Grains::damps, Planes::damps, account == Account::energy};
+    ++times;
+  });
+  EXPECT_EQ(times, 1);
+  return t;
+}
+
+// Just what they use, but where no row has it alone: softening between damped grains is in the general law.
+TEST(Laws, HaveWhatTheSceneUsesAndNoMore) {
+  for (const double mu_s : {0.0, 0.3, 0.5})
+    for (const double gamma : {0.0, 5.0})
+      for (const double gamma_wall : {0.0, 5.0})
+        for (const bool ledger : {false, true}) {
+          Scene s = with({1e7, 1e7, gamma, 0, mu_s, std::min(mu_s, 0.3)}, {1e7, 0, gamma_wall, 0, 0, 0});
+          s.ledger = ledger;
+          const bool softens = mu_s > 0.3, damps = gamma > 0;
+          EXPECT_EQ(taken_by(s), (Taken{mu_s > 0, softens, damps, damps || gamma_wall > 0, ledger}))
+              << mu_s << ' ' << gamma << ' ' << gamma_wall;
+        }
+}
+
+}  // namespace
+}  // namespace moraine::dem
