@@ -25,6 +25,6 @@ def machine():
     return about
 
 
-def version():
-    git = subprocess.run(["git", "-C", str(root), "describe", "--always", "--dirty"], capture_output=True, text=True)
+def version(checkout=root):
+    git = subprocess.run(["git", "-C", str(checkout), "describe", "--always", "--dirty"], capture_output=True, text=True)
     return git.stdout.strip() or "unknown"
