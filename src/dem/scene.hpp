@@ -59,7 +59,8 @@ struct Scene {
   bool operator==(const Scene&) const = default;
 
  private:
-  static constexpr std::array<Body, body_ids> with_floor() {
+  // Not constexpr: GCC 12 would then leave zeros in place of the defaults of all bodies after the floor.
+  static std::array<Body, body_ids> with_floor() {
     std::array<Body, body_ids> b{};
     b[static_cast<int>(BodyId::floor)] = floor_at(0);
     return b;

@@ -78,10 +78,11 @@ inline std::vector<double> orders(const std::vector<double>& dt, const std::vect
 }
 
 // Three hundred soft grains of mixed size that came to rest under their weight; x and y are periodic.
-struct Bed {
+struct SceneAndState {
   Scene scene;
   State state;
 };
+using Bed = SceneAndState;  // no type of that name here: the engine has one
 inline const Bed& settled_bed() {
   static const Bed bed = [] {
     Packing p;
