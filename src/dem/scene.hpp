@@ -61,6 +61,7 @@ struct Scene {
  private:
   static constexpr std::array<Body, body_ids> with_floor() {
     std::array<Body, body_ids> b{};
+    b.fill(Body{});  // GCC 12 leaves some of the defaults out
     b[static_cast<int>(BodyId::floor)] = floor_at(0);
     return b;
   }
