@@ -13,25 +13,25 @@ namespace {
 // A ring of numbers, each of which becomes the sum of its neighbours, many times over. Two buffers and one
 // barrier a round must do.
 struct Ring {
-  struct Desk {
+  struct Shared {
     int rounds;
   };
   std::vector<long>* numbers;  // [2]
   int rounds;
 
-  void operator()(const Host::Team& team, Desk& desk) const {
-    team.once([&] { desk.rounds = 0; });
+  void operator()(const Host::Team& team, Shared& shared) const {
+    team.once([&] { shared.rounds = 0; });
     const int n = static_cast<int>(numbers[0].size()), at_once = team.items_at_once();
-    while (desk.rounds < rounds) {
-      const std::vector<long>& old = numbers[desk.rounds & 1];
-      std::vector<long>& next = numbers[(desk.rounds + 1) & 1];
+    while (shared.rounds < rounds) {
+      const std::vector<long>& old = numbers[shared.rounds & 1];
+      std::vector<long>& next = numbers[(shared.rounds + 1) & 1];
       for (int begin = team.block() * at_once; begin < n; begin += team.blocks() * at_once)
         team.for_each_item(std::min(at_once, n - begin), [&](const auto& item) {
           const int i = begin + item.index;
           item.in_order(old[(i + 1) % n], [&](long x) { next[i] = (old[(i + n - 1) % n] + x) % 1000003; });
         });
       team.barrier();
-      team.once([&] { ++desk.rounds; });
+      team.once([&] { ++shared.rounds; });
     }
   }
 };
@@ -53,9 +53,9 @@ TEST(Team, OneBarrierARoundIsEnoughForTwoBuffers) {
 // No block without work: it would only make the others wait.
 TEST(Team, NoMoreBlocksThanUnits) {
   struct Count {
-    struct Desk {};
+    struct Shared {};
     std::atomic<int>*blocks, *most;
-    void operator()(const Host::Team& team, Desk&) const {
+    void operator()(const Host::Team& team, Shared&) const {
       ++*blocks;
       most->store(team.blocks());
     }

@@ -5,7 +5,7 @@
 #include <functional>
 
 #include "backends.hpp"
-#include "dem/gather_engine.hpp"
+#include "dem/gpu/gather_engine.hpp"
 #include "physics/scenes.hpp"
 
 namespace moraine::dem {
@@ -145,13 +145,13 @@ struct HostOfLanes : Host {
                   std::min<std::int64_t>(blocks, (units + units_at_once - 1) / units_at_once)),
               threads = units_at_once * unit * Team::Item::lanes;
     std::vector<Block> block(used);
-    std::vector<typename Body::Desk> desks(used);
+    std::vector<typename Body::Shared> shared(used);
     Fibers::Meeting all;
     Fibers fibers;
     for (int b = 0; b < used; ++b) {
       block[b].warps.resize(threads / warp), block[b].slots.resize(threads);
       for (int t = 0; t < threads; ++t)
-        fibers.add([&, b, t] { body(Team{t, threads, b, used, &block[b], &all}, desks[b]); });
+        fibers.add([&, b, t] { body(Team{t, threads, b, used, &block[b], &all}, shared[b]); });
     }
     fibers.run();
   }
@@ -159,8 +159,9 @@ struct HostOfLanes : Host {
 
 TEST(Lanes, SameBitsAsPairs) {
   std::vector<Bed> beds{sheared_bed(), sheared_bed(), cloud(700, 0.2, 5)};
-  beds[1].scene.shear = {Shear::Drive::stress, 0, 400, false};
-  beds[1].scene.grain.gamma_n = beds[1].scene.grain.gamma_t = 5;
+  beds[1].scene.body(BodyId::top_layer).x = Drive::by(400);
+  ContactParameters& grain = beds[1].scene.with(Material::grain);
+  grain.gamma_n = grain.gamma_t = 5;
   const std::int64_t steps = 40;
   for (std::size_t k = 0; k < beds.size(); ++k) {
     SCOPED_TRACE(k);
@@ -171,7 +172,7 @@ TEST(Lanes, SameBitsAsPairs) {
     for (const auto& [blocks, units_at_once] : {std::pair{1, 1}, std::pair{2, 3}, std::pair{5, 2}}) {
       HostOfLanes space;
       space.blocks = blocks, space.units_at_once = units_at_once;
-      GatherEngine<HostOfLanes> engine(space, "lanes on the host");
+      gpu::GatherEngine<HostOfLanes> engine(space, "lanes on the host");
       engine.load(scene, start, nullptr);
       engine.advance(1);
       engine.advance(steps - 1);

@@ -72,18 +72,19 @@ inline void feed_state(const output::Checkpoint& c, Digest& grains, Digest& cont
   grains.feed(s.id), grains.feed(s.r), grains.feed(s.x), grains.feed(s.v), grains.feed(s.omega);
   grains.feed(s.rotation), grains.feed(s.force), grains.feed(s.torque), grains.feed(s.water_force);
   grains.feed(s.x_start);
-  for (const dem::Role role : s.role)
-    grains.feed(static_cast<std::uint8_t>(role));  // 0 free, 1 bottom, 2 top
+  for (const dem::BodyId layer : s.part_of)
+    grains.feed(static_cast<std::uint8_t>(layer));  // 0 none, 1 bottom, 2 top
 
   for (const dem::Contact& k : s.contacts)
     contacts.feed(k.i), contacts.feed(k.j), contacts.feed(k.delta_t), contacts.feed(k.slipping);
 
   for (const dem::WallContact& k : s.wall_contacts) {
-    walls.feed(k.i), walls.feed(static_cast<std::int32_t>(k.wall));  // 0 floor, 1 top
+    const auto wall = static_cast<std::int32_t>(k.wall) - static_cast<std::int32_t>(dem::BodyId::floor);
+    walls.feed(k.i), walls.feed(wall);  // 0 floor, 1 top
     walls.feed(k.delta_t), walls.feed(k.slipping);
   }
-  for (const double of_wall : {s.wall_z, s.wall_v, s.wall_force, s.shear_force, s.layer_u})
-    walls.feed(of_wall);
+  const dem::BodyState &top = s.at(dem::BodyId::top_wall), &layer = s.at(dem::BodyId::top_layer);
+  for (const double of_wall : {top.x.z, top.v.z, top.force.z, layer.force.x, layer.v.x}) walls.feed(of_wall);
 
   for (const double of_water : {s.water.wall, s.water.layer, s.water.work, s.water.wall_between})
     water.feed(of_water);

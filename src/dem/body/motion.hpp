@@ -25,7 +25,8 @@ struct Plane {
   std::int32_t axis = 2;
   double facing = 1;
   double place = 0;  // m, along the axis
-  Vec3d v, v_ahead;  // m/s, at n - 1/2, and at n as foreseen before its forces are known (viscous contacts)
+  Vec3d v{},
+      v_ahead{};  // m/s, at n - 1/2, and at n as foreseen before its forces are known (viscous contacts)
 
   MORAINE_HD double gap(const Vec3d& x, double r) const { return gap_to_plane(x[axis], r, place, facing); }
   MORAINE_HD Geometry<double> geometry(const Vec3d& x, double r) const {

@@ -9,7 +9,7 @@
 #include "dem/scene_check.hpp"
 #include "dem/state_rows.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 namespace {
 
@@ -116,4 +116,4 @@ void check_lost(Bed& bed, const BodyMotion& bodies, const std::vector<Index>& id
         throw lost_grain(bed.scene, bodies, bed.grain.data()[i], id[i]);
 }
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::cpu

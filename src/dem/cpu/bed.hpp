@@ -15,7 +15,7 @@
 #include "dem/sums.hpp"
 #include "dem/uses.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 // A pair within the neighbour margin, from which near pairs are drawn.
 struct Candidate {
@@ -93,4 +93,4 @@ double fastest(const Bed& bed, const BodyMotion& bodies);
 // Throws Error where a grain is lost.
 void check_lost(Bed& bed, const BodyMotion& bodies, const std::vector<Index>& id);
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::cpu

@@ -6,7 +6,7 @@
 #include "dem/leapfrog.hpp"
 #include "dem/surroundings.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 namespace {
 
@@ -93,4 +93,4 @@ ChunkTask plane_forces_for(const Scene& scene) {
   return task;
 }
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::cpu

@@ -1,6 +1,6 @@
 #include "dem/cpu/exchange.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 bool Exchange::remap(const Bed& bed, const BodyMotion& bodies, bool leader, Barrier& barrier) {
   if (leader) keep_failure(bodies.step, [&] { surroundings_->remap(bed.grain.data(), bodies); });
@@ -21,4 +21,4 @@ void Exchange::alone(Bed& bed, const BodyMotion& bodies) {
   for (const Chunk& c : bed.chunks) push(bed, c, bed.water.data());
 }
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::cpu

@@ -12,7 +12,7 @@
 #include "dem/control.hpp"
 #include "dem/cpu/bed.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 class Exchange {
  public:
@@ -62,4 +62,4 @@ class Exchange {
   std::atomic<std::int64_t> solved_{-1};  // the last exchange whose pressures are known
 };
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::cpu

@@ -7,7 +7,7 @@
 #include "dem/body/plane_contact.hpp"
 #include "dem/cpu/rows.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 namespace {
 
@@ -145,4 +145,4 @@ void renew_near_pairs(Bed& bed, Chunk& chunk, const BodyMotion& bodies, double n
   renew_plane_pairs(bed, chunk, bodies, near_margin);
 }
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::cpu

@@ -7,7 +7,7 @@
 #include "dem/cpu/bed.hpp"
 #include "dem/neighbours.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 // How long the near lists last.
 struct NearMargin {
@@ -27,4 +27,4 @@ void find_candidates(const Host& space, Bed& bed, Neighbours<Host>& neighbours);
 // Near pairs of one chunk, between grains and with planes; springs move along.
 void renew_near_pairs(Bed& bed, Chunk& chunk, const BodyMotion& bodies, double near_margin);
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::cpu

@@ -3,7 +3,7 @@
 #include "dem/cpu/tasks.hpp"
 #include "dem/leapfrog.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 namespace {
 
@@ -74,4 +74,4 @@ ChunkTask motion_for(const Scene& scene) {
                  : move<Velocities::at_half_steps, Impulse::none>;
 }
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::cpu

@@ -14,7 +14,7 @@
 #include "dem/scene_check.hpp"
 #include "dem/state_rows.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 namespace {
 
@@ -147,6 +147,10 @@ std::string PairEngine::describe() const {
 
 }  // namespace
 
-std::unique_ptr<Engine> make_pair_engine(int threads) { return std::make_unique<PairEngine>(threads); }
+}  // namespace moraine::dem::cpu
+
+namespace moraine::dem {
+
+std::unique_ptr<Engine> make_pair_engine(int threads) { return std::make_unique<cpu::PairEngine>(threads); }
 
 }  // namespace moraine::dem

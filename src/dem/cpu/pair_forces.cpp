@@ -10,7 +10,7 @@
 #include "dem/cpu/rows.hpp"
 #include "dem/cpu/tasks.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 namespace {
 
@@ -163,4 +163,4 @@ ChunkTask pair_forces_for(const Scene& scene) {
   return task;
 }
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::cpu

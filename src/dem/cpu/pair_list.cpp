@@ -1,6 +1,6 @@
 #include "dem/cpu/pair_list.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 void PairList::clear() { pairs.clear(), springs.clear(), slipping.clear(), across_sides.clear(), count = 0; }
 
@@ -30,4 +30,4 @@ Spring<double> PairList::spring(Index place) const {
   return {{s.x[lane], s.y[lane], s.z[lane]}, slipping[place / lanes][lane]};
 }
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::cpu

@@ -9,7 +9,7 @@
 #include "dem/grain.hpp"
 #include "dem/law/contact.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 // Where a grain's rows are, in bytes from the first LoadRow; its GrainRow is twice as far from the first of
 // those. Kept instead of the index because the loop over pairs would have to compute it.
@@ -39,4 +39,4 @@ struct PairList {
   Spring<double> spring(Index place) const;
 };
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::cpu

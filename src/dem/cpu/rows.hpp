@@ -6,7 +6,7 @@
 #include "backend/number.hpp"
 #include "dem/grain.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 // A vector and the number behind it.
 using Row = Pack;
@@ -30,4 +30,4 @@ inline void clear(Host::Array<LoadRow>& loads) {
   std::fill(loads.data(), loads.data() + loads.size(), LoadRow{});
 }
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::cpu

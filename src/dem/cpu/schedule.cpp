@@ -5,7 +5,7 @@
 #include "dem/body/plane_contact.hpp"
 #include "dem/cpu/rows.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 namespace {
 
@@ -270,4 +270,4 @@ void Schedule::evaluate(const StepTasks& tasks, const BodyMotion& bodies, double
     for (const ChunkTask task : tasks.after_shares) task(bed_, c, at);
 }
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::cpu

@@ -18,7 +18,7 @@
 #include "dem/cpu/lists.hpp"
 #include "dem/cpu/tasks.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 class Schedule {
  public:
@@ -63,4 +63,4 @@ class Schedule {
   std::vector<Buffers> buffers_;          // by thread
 };
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::cpu

@@ -1,6 +1,6 @@
 #include "dem/cpu/tasks.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 StepTasks tasks_for(const Scene& scene) {
   StepTasks tasks;
@@ -33,4 +33,4 @@ StepTasks tasks_for(const Scene& scene) {
   return tasks;
 }
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::cpu

@@ -6,7 +6,7 @@
 #include "dem/cpu/bed.hpp"
 #include "dem/step.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::cpu {
 
 // Where and when a task works.
 struct ChunkStep {
@@ -35,4 +35,4 @@ ChunkTask layer_forces_for(const Scene& scene);   //
 ChunkTask damping_power_for(const Scene& scene);  //
 ChunkTask motion_for(const Scene& scene);         // motion.cpp
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::cpu

@@ -12,7 +12,7 @@ std::unique_ptr<Engine> make_cuda_engine() {
   cudaDeviceProp card;
   cuda_check(cudaGetDeviceProperties(&card, 0), "device properties");
   keep_memory_pool(0);
-  return std::make_unique<GatherEngine<Cuda>>(Cuda{}, std::string("cuda, ") + card.name);
+  return std::make_unique<gpu::GatherEngine<Cuda>>(Cuda{}, std::string("cuda, ") + card.name);
 }
 
 }  // namespace moraine::dem

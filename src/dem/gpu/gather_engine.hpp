@@ -15,9 +15,7 @@
 #include "dem/state_rows.hpp"
 #include "dem/uses.hpp"
 
-namespace moraine::dem {
-
-namespace gather {
+namespace moraine::dem::gpu {
 
 // Springs from the old rows of neighbours into the new ones.
 struct CarrySprings {
@@ -46,8 +44,6 @@ struct FindLost {
       if (is_lost(bodies, grain[i])) lost[c] = i;
   }
 };
-
-}  // namespace gather
 
 template <class Space>
 class GatherEngine final : public Engine {
@@ -183,9 +179,8 @@ class GatherEngine final : public Engine {
     std::swap(spring_, old_spring_);
     search(step);
     spring_.resize(std::max<std::int64_t>(lists_.total, 1));
-    space_.for_each(
-        n_, gather::CarrySprings{old_lists_.row.data(), lists_.row.data(), old_lists_.neighbour.data(),
-                                 lists_.neighbour.data(), old_spring_.data(), spring_.data()});
+    space_.for_each(n_, CarrySprings{old_lists_.row.data(), lists_.row.data(), old_lists_.neighbour.data(),
+                                     lists_.neighbour.data(), old_spring_.data(), spring_.data()});
     refresh_view();
   }
 
@@ -267,7 +262,7 @@ class GatherEngine final : public Engine {
   }
 
   void check_lost(const Control& control) {
-    space_.for_each(view_.chunks(), gather::FindLost{view_, lost_.data()});
+    space_.for_each(view_.chunks(), FindLost{view_, lost_.data()});
     for (const Index i : lost_.get())
       if (i >= 0)
         throw lost_grain(view_.scene, control.bodies, space_.read(grain_[control.bodies.step & 1].data() + i),
@@ -298,4 +293,4 @@ class GatherEngine final : public Engine {
   State kept_;  // what no step changes: ids, x_start, layers, bodies that do not move
 };
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::gpu

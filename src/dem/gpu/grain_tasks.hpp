@@ -7,7 +7,7 @@
 #include "dem/gpu/view.hpp"
 #include "dem/leapfrog.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::gpu {
 
 template <class Laws, Account account>
 struct GrainTasks {
@@ -144,4 +144,4 @@ struct GrainTasks {
   }
 };
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::gpu

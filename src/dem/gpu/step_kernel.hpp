@@ -9,7 +9,7 @@
 #pragma once
 #include "dem/gpu/grain_tasks.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::gpu {
 
 // Memory that the threads of a block share: its own copy of what all blocks agree on, and tallies on their
 // way into sums.
@@ -183,4 +183,4 @@ struct StepKernel {
   }
 };
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::gpu

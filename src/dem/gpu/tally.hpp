@@ -3,7 +3,7 @@
 #pragma once
 #include "dem/body/motion.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::gpu {
 
 struct Tally {
   static constexpr int most_sums = 2 + 2 * most_servos;
@@ -58,4 +58,4 @@ MORAINE_HD void reduce(Tally& to, int what, const Tally* tallies, Index count, b
   }
 }
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::gpu

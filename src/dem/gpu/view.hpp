@@ -4,7 +4,7 @@
 #include "dem/gpu/tally.hpp"
 #include "dem/sums.hpp"
 
-namespace moraine::dem {
+namespace moraine::dem::gpu {
 
 struct GatherView {
   Scene scene;
@@ -35,4 +35,4 @@ struct GatherView {
   }
 };
 
-}  // namespace moraine::dem
+}  // namespace moraine::dem::gpu
