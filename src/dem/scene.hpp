@@ -59,8 +59,7 @@ struct Scene {
   bool operator==(const Scene&) const = default;
 
  private:
-  // Not constexpr: GCC 12 would then leave zeros in place of the defaults of all bodies after the floor.
-  static std::array<Body, body_ids> with_floor() {
+  static constexpr std::array<Body, body_ids> with_floor() {
     std::array<Body, body_ids> b{};
     b.fill(Body{});  // GCC 12 leaves some of the defaults out
     b[static_cast<int>(BodyId::floor)] = floor_at(0);
