@@ -90,6 +90,9 @@ void check_case(const Entries& entries) {
     c.expect(kind == "flux" || c.number(key + "_flux") == 0, key + "_flux", "0 m/s, or ", side,
              " = \"flux\"");
   }
+  for (const char axis : c.text("box.walls") == "none" ? string() : c.text("box.walls"))
+    c.expect(periodic == "none" || periodic.find(axis) == string::npos, "box.walls", "none along ", axis,
+             ", which is periodic (box.periodic = \"", periodic, "\")");
   if (c.text("box.periodic").find('z') != string::npos) {
     c.expect(c.number("box.z") > 0, "box.z", "> 0 m where z is periodic");
     c.expect(!c.flag("box.floor"), "box.floor", "false where z is periodic");

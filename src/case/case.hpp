@@ -110,6 +110,7 @@ struct Case {
   double box_x, box_y, box_z;   // m; 0: from the lattice (x, y)
   bool periodic_x, periodic_y, periodic_z;
   bool floor;
+  bool walls_x, walls_y;  // at both sides
   Grains grains;
   std::string preset;  // "none", or what filled f, softening and wall viscosity
   double softening;    // what the stiffnesses below have been divided by

@@ -47,6 +47,11 @@ void set_periodic(const Key&, Case& c, Stage&, const Value& value) {
   c.periodic_x = has('x'), c.periodic_y = has('y'), c.periodic_z = has('z');
 }
 
+void set_walls(const Key&, Case& c, Stage&, const Value& value) {
+  const auto& axes = std::get<string>(value);
+  c.walls_x = axes.find('x') != axes.npos, c.walls_y = axes.find('y') != axes.npos;
+}
+
 void set_dt(const Key&, Case& c, Stage&, const Value& value) {
   c.automatic_dt = std::holds_alternative<string>(value);
   c.dt = c.automatic_dt ? 0 : std::get<double>(value);
@@ -123,6 +128,7 @@ std::vector<Key> make_keys() {
       row<&C::box_z>("box.z", "m", "0", ">= 0", "height; counts only where z is periodic"),
       {"box.periodic", Type::choice, "", "\"xy\"", "none | x | y | z | xy | xz | yz | xyz", "periodic sides", "", set_periodic},
       row<&C::floor>("box.floor", "", "true", "", "fixed wall at z = 0"),
+      {"box.walls", Type::choice, "", "\"none\"", "none | x | y | xy", "fixed walls at both sides of an axis that is not periodic; as rough as the floor (wall.k_t, stage.wall_mu)", "", set_walls},
 
       row<grains, &G::count>("grains.count", "", "10000", "1 .. 2147483647", "number of grains"),
       row<grains, &G::distribution>("grains.distribution", "", "\"lognormal\"", "lognormal | uniform", "of the radii"),

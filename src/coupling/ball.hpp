@@ -18,6 +18,7 @@ double ball_in_box(const dem::Vec3d& low, const dem::Vec3d& high);  // of the un
 // overlaps between grains counts in both. Beyond the others nothing counts.
 struct Holds {
   std::array<bool, 3> low{}, high{};
+  bool at(int axis, bool high_end) const { return high_end ? high[axis] : low[axis]; }
 };
 
 // The parts of one ball in the cells of a grid.

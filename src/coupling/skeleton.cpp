@@ -49,7 +49,7 @@ Skeleton::Skeleton(const Water& water, const dem::Scene& scene, const dem::State
     sides_.open_low[a] = sides.low[a].kind != fluid::Side::Kind::closed;
     sides_.open_high[a] = sides.high[a].kind != fluid::Side::Kind::closed;
   }
-  sides_.holds = {{false, false, has_floor(scene)}, {false, false, has_wall(scene)}};
+  sides_.holds = held_sides(scene);
 }
 
 void Skeleton::make(const std::vector<Vec3d>& x, double height) {
@@ -63,8 +63,10 @@ void Skeleton::make(const std::vector<Vec3d>& x, double height) {
     phi = std::clamp(phi, water_.porosity_range[0], water_.porosity_range[1]);
     medium_.permeability[c] = kozeny_carman(water_.k_c, phi);
   }
-  if (has_floor(scene_)) medium_.gap[2][0] = wall_gap(grid_, grains_.data(), x, water_.porosity_range, false);
-  if (has_wall(scene_)) medium_.gap[2][1] = wall_gap(grid_, grains_.data(), x, water_.porosity_range, true);
+  for (int a = 0; a < 3; ++a)
+    for (const bool high : {false, true})
+      if (sides_.holds.at(a, high))
+        medium_.gap[a][high] = wall_gap(grid_, grains_.data(), x, water_.porosity_range, a, high);
 }
 
 double Skeleton::longest_way(const std::vector<Vec3d>& x, const dem::GrainRow* now) const {
@@ -91,8 +93,10 @@ std::vector<double> Skeleton::squeeze(const std::vector<Vec3d>& x) {
   for (std::size_t i = 0; i < x.size(); ++i) {
     dem::GrainRow& g = grains_[i];
     g.x = x[i];
-    if (has_floor(scene_)) sum[i] += std::max(g.r - g.x.z, 0.0);
-    if (has_wall(scene_)) sum[i] += std::max(g.x.z + g.r - grid_.length[2], 0.0);
+    for (int a = 2; a >= 0; --a) {
+      if (sides_.holds.low[a]) sum[i] += std::max(g.r - x[i][a], 0.0);
+      if (sides_.holds.high[a]) sum[i] += std::max(x[i][a] + g.r - grid_.length[a], 0.0);
+    }
   }
   touching_.each(scene_, grains_.data(), static_cast<dem::Index>(x.size()),
                  [&](dem::Index i, dem::Index j, double overlap) { sum[i] += overlap, sum[j] += overlap; });

@@ -21,9 +21,9 @@ namespace moraine::coupling {
 
 double kozeny_carman(double k_c, double porosity);  // m2
 
-// Of the cells at the floor or at the top wall (high).
+// Of the cells at the wall at one end of an axis.
 fluid::WallGap wall_gap(const fluid::Grid& grid, const dem::GrainRow* grains,
                         const std::vector<dem::Vec3d>& x, const std::array<double, 2>& porosity_range,
-                        bool high);
+                        int axis, bool high);
 
 }  // namespace moraine::coupling

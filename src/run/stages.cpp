@@ -58,6 +58,12 @@ dem::Scene scene_of(const cases::Case& c, const cases::Stage& stage, const Start
   scene.neighbour_margin = c.neighbour_margin, scene.ledger = c.ledger;
   scene.fluid_density = stage.fluid ? c.fluid.density : 0;
   if (!c.floor) scene.body(BodyId::floor) = {};
+  if (c.walls_x)
+    scene.body(BodyId::x_low) = dem::plane(0, 1, 0),
+    scene.body(BodyId::x_high) = dem::plane(0, -1, scene.box.x);
+  if (c.walls_y)
+    scene.body(BodyId::y_low) = dem::plane(1, 1, 0),
+    scene.body(BodyId::y_high) = dem::plane(1, -1, scene.box.y);
   scene.body(BodyId::top_wall) = top_wall_of(c, stage, start, height);
   if (!shears(stage.kind)) return scene;
   const dem::Drive along_x =
