@@ -42,7 +42,7 @@ std::vector<WallForce> wall_forces(const Scene& scene, const State& s, const Vel
     const Plane* plane = bodies.find(w.wall);
     if (!plane) continue;
     const GrainRow g = grain_at(s, w.i, at.v, at.omega);
-    Spring<double> spring{w.delta_t, w.slipping};
+    Spring<double> spring = w.spring;
     const PlaneAction a =
         plane_action<GeneralLaw, Account::none>(scene, 0, *plane, g, {g.v, 0, g.omega, 0}, spring);
     out.push_back({w.i, w.wall, std::abs(a.f[plane->axis]), a.f, plane->gap(g.x, g.r)});
@@ -78,7 +78,7 @@ std::vector<ContactForce> contact_forces(const Scene& scene, const State& s) {
     const Vec3d x_ij = nearest_image(sides, s.x[c.i] - s.x[c.j]);
     const Geometry<double> g = between_grains(x_ij, s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]);
     const Motion<double> motion{at.v[c.i] - at.v[c.j], at.omega[c.i], at.omega[c.j]};
-    Spring<double> spring{c.delta_t, c.slipping};
+    Spring<double> spring = c.spring;
     const Action<double> a =
         contact_law<GeneralLaw, Account::none>(scene.with(Material::grain), 0, g, motion, motion, spring);
     const Vec3d f_n = dot(a.f, g.n) * g.n;
@@ -93,7 +93,7 @@ void mark_slipping(const Scene& scene, State& s) {
   for (std::size_t k = 0; k < forces.size(); ++k) {
     const double limit = (1 - rounding) * scene.with(Material::grain).mu_d;
     const double f_t2 = dot(forces[k].f_t, forces[k].f_t), f_n2 = dot(forces[k].f_n, forces[k].f_n);
-    s.contacts[k].slipping = f_t2 > 0 && f_t2 >= limit * limit * f_n2 ? 1 : 0;
+    s.contacts[k].spring.slipping = f_t2 > 0 && f_t2 >= limit * limit * f_n2 ? 1 : 0;
   }
 }
 
@@ -189,11 +189,11 @@ Observation observe(const Scene& scene, const State& s, const Loads& loads) {
     return scene.with(scene.body(id).material);
   };
   for (const ContactForce& c : contacts) e.elastic_normal += GeneralLaw::stored_normal(grain, c.overlap);
-  for (const Contact& c : s.contacts) e.elastic_tangential += stored_along(grain, c.delta_t);
+  for (const Contact& c : s.contacts) e.elastic_tangential += stored_along(grain, c.spring.delta_t);
   for (const WallForce& w : walls)
     e.elastic_normal += GeneralLaw::stored_normal(of_plane(w.wall), -w.delta_n);
   for (const WallContact& w : s.wall_contacts)
-    if (scene.has(w.wall)) e.elastic_tangential += stored_along(of_plane(w.wall), w.delta_t);
+    if (scene.has(w.wall)) e.elastic_tangential += stored_along(of_plane(w.wall), w.spring.delta_t);
 
   double net = 0;
   Index free = 0;

@@ -13,6 +13,17 @@ namespace {
 
 constexpr Index leaf = 4;  // grains that are close enough in any order
 
+// As j sees it.
+void turn_round(Spring<double>& spring) {
+  const auto turn = [](const char*, auto& value, const auto&) {
+    if constexpr (std::is_same_v<std::remove_reference_t<decltype(value)>, Vec3d>) value = -value;
+  };
+  MoreParts::for_each_memory([&]<class Part>() {
+    typename Part::template Memory<double>& memory = spring;
+    for_each_named(memory, memory, turn);
+  });
+}
+
 class Halving {
  public:
   Halving(const Sides& sides, const State& state) : sides_(sides), state_(state) {}
@@ -78,7 +89,7 @@ void sort_spatially(const Scene& scene, State& s) {
   permute(s.force), permute(s.torque), permute(s.x_start), permute(s.part_of);
   for (Contact& c : s.contacts) {
     c.i = place[c.i], c.j = place[c.j];
-    if (c.i > c.j) std::swap(c.i, c.j), c.delta_t = -c.delta_t;
+    if (c.i > c.j) std::swap(c.i, c.j), turn_round(c.spring);
   }
   for (WallContact& w : s.wall_contacts) w.i = place[w.i];
   sort_contacts(s);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dem/body/body.hpp"
+#include "dem/law/laws.hpp"
 #include "dem/vec3.hpp"
 
 namespace moraine::dem {
@@ -16,16 +17,14 @@ namespace moraine::dem {
 using Index = std::int32_t;
 
 struct Contact {
-  Index i, j;       // i < j, memory order
-  Vec3d delta_t;    // m, tangential spring of i against j
-  double slipping;  // 1 if it slipped in the last step, else 0; counts only where mu_d < mu_s
+  Index i, j;  // i < j, memory order
+  Spring<double> spring;
 };
 
 struct WallContact {
   Index i;
   BodyId wall;
-  Vec3d delta_t;
-  double slipping;
+  Spring<double> spring;
 };
 
 // Energy that has passed since the stage began, J. See observe.hpp for the balance.

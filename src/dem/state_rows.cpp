@@ -53,24 +53,25 @@ void append_grain(State& s, const GrainRow& g, const LoadRow& load, BodyId part_
   s.part_of.push_back(part_of);
 }
 
-// What a contact remembers under this law: without friction there is no spring, and without softening it does
-// not matter whether it slips, whatever an earlier stage has left.
-static Spring<double> remembered(const ContactParameters& p, const Spring<double>& s) {
-  return {p.k_t > 0 && p.mu_s > 0 ? s.delta_t : Vec3d{}, SofteningCoulomb::used(p) ? s.slipping : 0};
+// What a contact remembers under this law, whatever an earlier stage has left: without friction there is no
+// spring, ...
+static Spring<double> remembered(const ContactParameters& p, Spring<double> s) {
+  MoreParts::for_each_memory([&]<class Part>() {
+    if (!Part::keeps(p)) static_cast<typename Part::template Memory<double>&>(s) = {};
+  });
+  return s;
 }
 
 void append_contact(State& s, const Scene& scene, const Sides& sides, const GrainRow& a, const GrainRow& b,
                     Index i, Index j, const Spring<double>& spring) {
   if (!(between_grains(nearest_image(sides, a.x - b.x), a.r + b.r, a.r - b.r).delta_n < 0)) return;
-  const auto [delta_t, slipping] = remembered(scene.with(Material::grain), spring);
-  s.contacts.push_back({i, j, delta_t, slipping});
+  s.contacts.push_back({i, j, remembered(scene.with(Material::grain), spring)});
 }
 
 void append_wall_contact(State& s, const Scene& scene, const Plane& plane, const GrainRow& g, Index i,
                          const Spring<double>& spring) {
   if (!(plane.gap(g.x, g.r) < 0)) return;
-  const auto [delta_t, slipping] = remembered(scene.with(plane.material), spring);
-  s.wall_contacts.push_back({i, plane.id, delta_t, slipping});
+  s.wall_contacts.push_back({i, plane.id, remembered(scene.with(plane.material), spring)});
 }
 
 void finish_state(State& s, const BodyMotion& bodies) {

@@ -27,64 +27,64 @@ enum class Task {
 };
 
 // What tasks hand on, as bits.
-namespace data {
-constexpr unsigned grains = 1,  // positions at n, velocities at n - 1/2
-    planes = 2,                 // where step n finds them
-    pairs = 4,                  // that may touch, with their springs
-    loads = 8,                  // forces and torques on grains at n, slip
-    shares = 16,                // the part of them that another chunk's pairs make
-    body_forces = 32,           // what grains do to bodies, and what viscous contacts take
-    pressure = 64,              // of the pore water at n
-    impulse = 128,              // of it on grains
-    totals = 256,               // sums over the bed, by chunk: body forces, slip, the largest speed
-    next_grains = 512,
-                   next_bodies = 1024;  // also the ledger at n, and whether lists last for another step
-}  // namespace data
+namespace step {
+enum Data : unsigned {
+  grains = 1,         // positions at n, velocities at n - 1/2
+  bodies = 2,         // where step n finds them
+  pairs = 4,          // that may touch, with their springs
+  loads = 8,          // forces and torques on grains at n, slip
+  shares = 16,        // the part of them that another chunk's pairs make
+  body_forces = 32,   // what grains do to bodies, and what viscous contacts take
+  pressure = 64,      // of the pore water at n
+  impulse = 128,      // of it on grains
+  next_grains = 256,  // at n + 1
+  totals = 512,       // sums over the bed, by chunk: body forces, slip, the largest speed
+  next_bodies = 1024  // also the ledger at n, and whether lists last for another step
+};
+}  // namespace step
 
 struct TaskRow {
   Task task;
   const char* name;
   enum class Of { chunk, bed } of;
-  unsigned needs, gives;
+  unsigned needs, gives;  // step::Data
   bool (*in_step)(const Scene&);
 };
 
-namespace in_step {
+namespace step {
+
+constexpr auto chunk = TaskRow::Of::chunk, bed = TaskRow::Of::bed;
 inline bool always(const Scene&) { return true; }
 inline bool with_water(const Scene& s) { return uses_of(s).water; }
 inline bool with_planes(const Scene& s) { return s.has_planes(); }
-inline bool with_driven_layers(const Scene& s) { return s.body(BodyId::top_layer).is_there(); }
+inline bool with_layers(const Scene& s) { return s.has(BodyId::top_layer); }
 inline bool with_damping_ledger(const Scene& s) { return uses_of(s).damping_ledger(); }
-}  // namespace in_step
 
-inline constexpr TaskRow step_tasks[] = {
-    {Task::exchange, "exchange", TaskRow::Of::bed, data::grains | data::planes, data::pressure,
-     in_step::with_water},
-    {Task::near_pairs, "near pairs", TaskRow::Of::chunk, data::grains, data::pairs, in_step::always},
-    {Task::pair_forces, "pair forces", TaskRow::Of::chunk, data::grains | data::pairs,
-     data::loads | data::shares, in_step::always},
-    {Task::shares, "shares", TaskRow::Of::chunk, data::loads | data::shares, data::loads, in_step::always},
-    {Task::plane_forces, "plane forces", TaskRow::Of::chunk, data::grains | data::planes | data::loads,
-     data::loads | data::body_forces, in_step::with_planes},
-    {Task::layer_forces, "layer forces", TaskRow::Of::chunk, data::loads, data::body_forces,
-     in_step::with_driven_layers},
-    {Task::damping_power, "damping power", TaskRow::Of::chunk, data::grains | data::loads, data::body_forces,
-     in_step::with_damping_ledger},
-    {Task::push, "push", TaskRow::Of::chunk, data::grains | data::pressure, data::impulse,
-     in_step::with_water},
-    {Task::motion, "motion", TaskRow::Of::chunk, data::grains | data::loads, data::next_grains,
-     in_step::always},
-    {Task::sums, "sums", TaskRow::Of::bed, data::loads | data::next_grains, data::totals, in_step::always},
-    {Task::bodies, "bodies", TaskRow::Of::bed, data::planes | data::totals, data::next_bodies,
-     in_step::always},
+// clang-format off
+inline constexpr TaskRow tasks[] = {
+    // task             name             of     needs                     gives                what scenes
+    {Task::exchange,      "exchange",      bed,   grains | bodies,          pressure,            with_water},
+    {Task::near_pairs,    "near pairs",    chunk, grains,                   pairs,               always},
+    {Task::pair_forces,   "pair forces",   chunk, grains | pairs,           loads | shares,      always},
+    {Task::shares,        "shares",        chunk, loads | shares,           loads,               always},
+    {Task::plane_forces,  "plane forces",  chunk, grains | bodies | loads,  loads | body_forces, with_planes},
+    {Task::layer_forces,  "layer forces",  chunk, loads,                    body_forces,         with_layers},
+    {Task::damping_power, "damping power", chunk, grains | loads,           body_forces,         with_damping_ledger},
+    {Task::push,          "push",          chunk, grains | pressure,        impulse,             with_water},
+    {Task::motion,        "motion",        chunk, grains | loads,           next_grains,         always},
+    {Task::sums,          "sums",          bed,   loads | next_grains,      totals,              always},
+    {Task::bodies,        "bodies",        bed,   bodies | totals,          next_bodies,         always},
 };
+// clang-format on
 
 // Those of a scene's step, in their order.
-inline std::vector<TaskRow> tasks_of(const Scene& scene) {
-  std::vector<TaskRow> tasks;
-  for (const TaskRow& row : step_tasks)
-    if (row.in_step(scene)) tasks.push_back(row);
-  return tasks;
+inline std::vector<TaskRow> of(const Scene& scene) {
+  std::vector<TaskRow> list;
+  for (const TaskRow& row : tasks)
+    if (row.in_step(scene)) list.push_back(row);
+  return list;
 }
+
+}  // namespace step
 
 }  // namespace moraine::dem

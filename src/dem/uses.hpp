@@ -24,7 +24,7 @@ inline Uses uses_of(const Scene& s) {
   const auto any = [&](auto test) { return test(grain) || (s.has_planes() && test(wall)); };
   Uses u;
   u.friction = any([](const ContactParameters& p) { return p.mu_s > 0 && (p.k_t > 0 || p.gamma_t > 0); });
-  u.softening = u.friction && any([](const ContactParameters& p) { return SofteningCoulomb::used(p); });
+  u.softening = u.friction && any([](const ContactParameters& p) { return SofteningCoulomb::keeps(p); });
   u.damped_grains = Viscosity::used(grain);
   u.damped = any([](const ContactParameters& p) { return Viscosity::used(p); });
   u.ledger = s.ledger;

@@ -70,16 +70,14 @@ template <>
 constexpr std::tuple members<dem::Contact>{
     Member{"i", &dem::Contact::i},
     Member{"j", &dem::Contact::j},
-    Member{"delta_t", &dem::Contact::delta_t},
-    Member{"slipping", &dem::Contact::slipping},
+    Member{"spring", &dem::Contact::spring},
 };
 
 template <>
 constexpr std::tuple members<dem::WallContact>{
     Member{"i", &dem::WallContact::i},
     Member{"wall", &dem::WallContact::wall},
-    Member{"delta_t", &dem::WallContact::delta_t},
-    Member{"slipping", &dem::WallContact::slipping},
+    Member{"spring", &dem::WallContact::spring},
 };
 
 template <>
@@ -262,7 +260,8 @@ constexpr std::size_t member_count() {
   }
 }
 
-// Parameters of contacts list themselves (law/parameters.hpp): those of a new part need nothing here.
+// Parameters of contacts and what contacts remember list themselves (law/part.hpp): a new part needs nothing
+// here.
 template <class T>
 concept ListsItself = requires {
   T::list();
@@ -271,8 +270,10 @@ concept ListsItself = requires {
 template <class T>
 constexpr bool is_stored_struct = [] {
   if constexpr (ListsItself<T>) {
-    constexpr std::size_t described = std::tuple_size_v<decltype(T::list())>;
-    static_assert(sizeof(T) == described * sizeof(double), "a parameter is missing from its part's list");
+    constexpr std::size_t described = std::apply(
+        [](const auto&... named) { return (std::size_t{0} + ... + sizeof(std::declval<T>().*named.member)); },
+        T::list());
+    static_assert(sizeof(T) == described, "a member is missing from its part's list");
     return true;
   } else {
     constexpr std::size_t described = std::tuple_size_v<std::remove_cvref_t<decltype(members<T>)>>;
@@ -285,7 +286,7 @@ constexpr bool is_stored_struct = [] {
 template <class T, class F>
 void for_each_member(F f) {
   if constexpr (ListsItself<T>)
-    std::apply([&](const auto&... parameter) { (f(parameter.name, parameter.value), ...); }, T::list());
+    std::apply([&](const auto&... parameter) { (f(parameter.name, parameter.member), ...); }, T::list());
   else
     std::apply([&](const auto&... member) { (f(member.name, member.pointer), ...); }, members<T>);
 }

@@ -240,8 +240,8 @@ void forget(const cases::Stage& stage, dem::State& s) {
     for (dem::BodyState& body : s.bodies) body.v = {0, 0, 0};
   }
   if (stage.clear_history) {
-    for (dem::Contact& contact : s.contacts) contact.delta_t = {0, 0, 0}, contact.slipping = 0;
-    for (dem::WallContact& w : s.wall_contacts) w.delta_t = {0, 0, 0}, w.slipping = 0;
+    for (dem::Contact& contact : s.contacts) contact.spring = {};
+    for (dem::WallContact& w : s.wall_contacts) w.spring = {};
   }
 }
 

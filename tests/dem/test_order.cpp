@@ -25,7 +25,7 @@ State shuffled(const State& s) {
   }
   for (Contact& c : out.contacts) {
     c.i = place[c.i], c.j = place[c.j];
-    if (c.i > c.j) std::swap(c.i, c.j), c.delta_t = -c.delta_t;
+    if (c.i > c.j) std::swap(c.i, c.j), c.spring.delta_t = -c.spring.delta_t;
   }
   std::sort(out.contacts.begin(), out.contacts.end(),
             [](const Contact& a, const Contact& b) { return std::pair(a.i, a.j) < std::pair(b.i, b.j); });

@@ -171,8 +171,8 @@ inline void expect_same_bits(const State& a, const State& b) {
   same(a.contacts, b.contacts, "contacts");
   const auto members = [](const std::vector<WallContact>& contacts) {  // without what lies between them
     std::vector<std::array<double, 6>> out;
-    for (const auto& [i, wall, delta_t, slipping] : contacts)
-      out.push_back({double(i), double(wall), delta_t.x, delta_t.y, delta_t.z, slipping});
+    for (const auto& [i, wall, s] : contacts)
+      out.push_back({double(i), double(wall), s.delta_t.x, s.delta_t.y, s.delta_t.z, s.slipping});
     return out;
   };
   same(members(a.wall_contacts), members(b.wall_contacts), "wall_contacts");

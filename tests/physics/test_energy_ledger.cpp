@@ -23,8 +23,8 @@ std::vector<Variant> variants() {
   Bed& smooth = all[4].bed;
   all[4].name = "no friction, no damping";
   smooth.scene.contact.fill(LinearContact{1e5, 0, 0, 0, 0, 0});
-  for (Contact& c : smooth.state.contacts) c.delta_t = {0, 0, 0};
-  for (WallContact& c : smooth.state.wall_contacts) c.delta_t = {0, 0, 0};
+  for (Contact& c : smooth.state.contacts) c.spring.delta_t = {0, 0, 0};
+  for (WallContact& c : smooth.state.wall_contacts) c.spring.delta_t = {0, 0, 0};
   return all;
 }
 

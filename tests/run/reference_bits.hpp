@@ -76,12 +76,12 @@ inline void feed_state(const output::Checkpoint& c, Digest& grains, Digest& cont
     grains.feed(static_cast<std::uint8_t>(layer));  // 0 none, 1 bottom, 2 top
 
   for (const dem::Contact& k : s.contacts)
-    contacts.feed(k.i), contacts.feed(k.j), contacts.feed(k.delta_t), contacts.feed(k.slipping);
+    contacts.feed(k.i), contacts.feed(k.j), contacts.feed(k.spring.delta_t), contacts.feed(k.spring.slipping);
 
   for (const dem::WallContact& k : s.wall_contacts) {
     const auto wall = static_cast<std::int32_t>(k.wall) - static_cast<std::int32_t>(dem::BodyId::floor);
     walls.feed(k.i), walls.feed(wall);  // 0 floor, 1 top
-    walls.feed(k.delta_t), walls.feed(k.slipping);
+    walls.feed(k.spring.delta_t), walls.feed(k.spring.slipping);
   }
   const dem::BodyState &top = s.at(dem::BodyId::top_wall), &layer = s.at(dem::BodyId::top_layer);
   for (const double of_wall : {top.x.z, top.v.z, top.force.z, layer.force.x, layer.v.x}) walls.feed(of_wall);

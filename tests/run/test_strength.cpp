@@ -90,8 +90,8 @@ TEST_F(Directions, AMirroredBedHasTheSameStrength) {
     for (dem::Vec3d& v : *list) mirror(v);
   for (auto* list : {&s.omega, &s.torque, &s.rotation})
     for (dem::Vec3d& v : *list) mirror_axial(v);
-  for (dem::Contact& c : s.contacts) mirror(c.delta_t);
-  for (dem::WallContact& c : s.wall_contacts) mirror(c.delta_t);
+  for (dem::Contact& c : s.contacts) mirror(c.spring.delta_t);
+  for (dem::WallContact& c : s.wall_contacts) mirror(c.spring.delta_t);
   fs::create_directories(directory.path() / "mirror/output");
   output::write_checkpoint(checkpoint_of(directory.path() / "mirror"), bed);
 

@@ -31,9 +31,9 @@ void place_contacts(std::vector<Chunk>& chunks, const std::vector<Contact>& cont
   auto contact = contacts.begin();
   for (Chunk& chunk : chunks)
     for (; contact != contacts.end() && contact->i < chunk.end; ++contact) {
-      const auto& [i, j, delta_t, slipping] = *contact;
+      const auto& [i, j, spring] = *contact;
       const int part = j < chunk.end ? 0 : 1;
-      const Index place = chunk.near[part].add(i, j, 0, false, {delta_t, slipping});
+      const Index place = chunk.near[part].add(i, j, 0, false, spring);
       chunk.candidates[part].push_back({i, j, no_link, place});
     }
 }
@@ -42,7 +42,7 @@ void place_plane_contacts(Bed& bed, const std::vector<WallContact>& contacts, co
   for (const WallContact& w : contacts)
     if (const Plane* plane = bodies.find(w.wall))
       bed.chunks[w.i / bed.chunk_size].planes.push_back(
-          {w.i, static_cast<std::int32_t>(plane - bodies.plane), {w.delta_t, w.slipping}});
+          {w.i, static_cast<std::int32_t>(plane - bodies.plane), w.spring});
   for (Chunk& chunk : bed.chunks)
     std::ranges::sort(chunk.planes, {}, [](const PlanePair& p) { return std::tuple(p.i, p.plane); });
 }

@@ -76,7 +76,7 @@ void renew_pairs(Bed& bed, Chunk& chunk, int part, double near_margin) {
         target = link.first + link.used++;
         bed.slot_owner.data()[target] = q.j;
       }
-      const Spring<double> spring = q.place == not_near ? Spring<double>{{0, 0, 0}, 0} : old.spring(q.place);
+      const Spring<double> spring = q.place == not_near ? Spring<double>{} : old.spring(q.place);
       q.place = list.add(q.i, q.j, target, across[k] > 0, spring);
     }
   }
@@ -95,7 +95,7 @@ void renew_plane_pairs(Bed& bed, Chunk& chunk, const BodyMotion& bodies, double 
       if (!(bodies.plane[k].gap(g.x, g.r) < near_margin)) continue;
       while (known != chunk.planes.end() && at(*known) < std::tie(i, k)) ++known;
       const bool same = known != chunk.planes.end() && at(*known) == std::tie(i, k);
-      pairs.push_back(same ? *known : PlanePair{i, k, {{0, 0, 0}, 0}});
+      pairs.push_back(same ? *known : PlanePair{i, k, {}});
     }
   }
   chunk.planes = std::move(pairs);

@@ -7,7 +7,7 @@
 
 #include "backend/number.hpp"
 #include "dem/grain.hpp"
-#include "dem/law/contact.hpp"
+#include "dem/law/laws.hpp"
 
 namespace moraine::dem::cpu {
 
@@ -26,9 +26,8 @@ struct PairGroup {
 
 struct PairList {
   std::vector<PairGroup> pairs;
-  std::vector<Vec3<Pack>> springs;
-  std::vector<Pack> slipping;
-  std::vector<bool> across_sides;  // groups with a pair that touches across periodic sides
+  MoreParts::MemoryLists<std::vector, Pack> memory;  // by group
+  std::vector<bool> across_sides;                    // groups with a pair that touches across periodic sides
   Index count = 0;
 
   void clear();
@@ -37,6 +36,16 @@ struct PairList {
   // Fills the last group with a pair that never touches.
   void pad(Index i, Index far_away, Index target);
   Spring<double> spring(Index place) const;
+
+  // What a part of the law remembers of each group.
+  template <class Part>
+  auto& of() {
+    return std::get<std::vector<typename Part::template Memory<Pack>>>(memory);
+  }
+  template <class Part>
+  const auto& of() const {
+    return std::get<std::vector<typename Part::template Memory<Pack>>>(memory);
+  }
 };
 
 }  // namespace moraine::dem::cpu

@@ -4,7 +4,7 @@ namespace moraine::dem::cpu {
 
 StepTasks tasks_for(const Scene& scene) {
   StepTasks tasks;
-  for (const TaskRow& row : tasks_of(scene)) switch (row.task) {
+  for (const TaskRow& row : step::of(scene)) switch (row.task) {
       case Task::pair_forces:
         tasks.at_once.push_back(pair_forces_for(scene));
         break;

@@ -18,7 +18,7 @@ struct ChunkStep {
 };
 using ChunkTask = void (*)(Bed&, Chunk&, const ChunkStep&);
 
-// In the order of step_tasks. Searching, water and sums are the schedule's (schedule.hpp).
+// In the order of step::tasks. Searching, water and sums are the schedule's (schedule.hpp).
 struct StepTasks {
   std::vector<ChunkTask> at_once;  // on what a chunk has or later ones hold still: pair forces
   std::vector<ChunkTask>

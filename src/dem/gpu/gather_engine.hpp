@@ -25,7 +25,7 @@ struct CarrySprings {
   Spring<double>* spring;
   MORAINE_HD void operator()(std::int64_t i) const {
     for (std::int64_t k = row[i]; k < row[i + 1]; ++k) {
-      spring[k] = {{0, 0, 0}, 0};
+      spring[k] = {};
       for (std::int64_t q = old_row[i]; q < old_row[i + 1]; ++q)
         if (old_neighbour[q] == neighbour[k]) spring[k] = old_spring[q];
     }
@@ -149,10 +149,9 @@ class GatherEngine final : public Engine {
       for (std::size_t i = 0; i < water.size(); ++i) water[i] = {s.water_force[i], 0};
     water_.set(water);
     const auto planes = static_cast<std::size_t>(bodies.planes);
-    std::vector<Spring<double>> springs(std::max<std::size_t>(planes * n_, 1), {{0, 0, 0}, 0});
+    std::vector<Spring<double>> springs(std::max<std::size_t>(planes * n_, 1));
     for (const WallContact& w : s.wall_contacts)
-      if (const Plane* plane = bodies.find(w.wall))
-        springs[planes * w.i + (plane - bodies.plane)] = {w.delta_t, w.slipping};
+      if (const Plane* plane = bodies.find(w.wall)) springs[planes * w.i + (plane - bodies.plane)] = w.spring;
     plane_spring_.set(springs);
     lost_.resize(view_.chunks());
   }
@@ -187,11 +186,11 @@ class GatherEngine final : public Engine {
   void place_springs(const std::vector<Contact>& contacts) {
     const std::vector<std::int64_t> row = lists_.row.get();
     const std::vector<Index> neighbour = lists_.neighbour.get();
-    std::vector<Spring<double>> springs(std::max<std::int64_t>(lists_.total, 1), {{0, 0, 0}, 0});
+    std::vector<Spring<double>> springs(std::max<std::int64_t>(lists_.total, 1));
     for (const Contact& c : contacts)
       for (const auto& [i, j] : {std::pair{c.i, c.j}, std::pair{c.j, c.i}})
         for (std::int64_t k = row[i]; k < row[i + 1]; ++k)
-          if (neighbour[k] == j) springs[k] = {c.delta_t, c.slipping};
+          if (neighbour[k] == j) springs[k] = c.spring;
     spring_.set(springs);
   }
 

@@ -45,17 +45,15 @@ struct Law {
   }
   template <class Part>
   static constexpr bool has = (std::is_same_v<Part, More> || ...);
+  // Whether it reads and writes what this part remembers.
+  template <class Part>
+  static constexpr bool remembers = std::is_same_v<Part, Coulomb>            ? rubs
+                                    : std::is_same_v<Part, SofteningCoulomb> ? softens
+                                                                             : has<Part>;
 };
 
 // Whether what a contact dissipates is worked out.
 enum class Account { none, energy };
-
-// What a contact remembers.
-template <class T>
-struct Spring {
-  Vec3<T> delta_t;  // m
-  T slipping;       // 1 after a step that slipped, else 0 (softening only)
-};
 
 template <class T>
 struct Action {
@@ -117,14 +115,14 @@ struct Grip {
   T f_n, share;
 };
 
-template <class L, class P, class T>
+template <class L, class P, class T, class Spring>
 MORAINE_HD Grip<T> grip(const P& p, const Geometry<T>& g, const Motion<T>& now, const Vec3<T>& delta_t,
-                        const T& slipping) {
+                        const Spring& spring) {
   const T f_n = normal_force<L>(p, g, now);
   if constexpr (!L::rubs) {
     return {f_n, T(0)};
   } else {
-    const T limit = L::Friction::limit(p, f_n, slipping);
+    const T limit = L::Friction::limit(p, f_n, spring);
     T size2;  // |f_t|^2
     if constexpr (L::damps) {
       const Vec3<T> f_t = damped_tangential<L>(p, g, now, delta_t);
@@ -137,9 +135,9 @@ MORAINE_HD Grip<T> grip(const P& p, const Geometry<T>& g, const Motion<T>& now, 
 }
 
 // The forces; the spring is left at what it carries. dt = 0: no step was taken, so what slipped still slips.
-template <class L, Account account, class P, class T>
+template <class L, Account account, class P, class T, class Spring>
 MORAINE_HD Action<T> act(const P& p, double dt, const Geometry<T>& g, const Motion<T>& now,
-                         const Vec3<T>& delta_t, const Grip<T>& grip, Spring<T>& spring) {
+                         const Vec3<T>& delta_t, const Grip<T>& grip, Spring& spring) {
   constexpr bool ledger = account == Account::energy;
   const T zero(0);
   const Vec3<T> none{zero, zero, zero};
@@ -184,12 +182,12 @@ MORAINE_HD Action<T> act(const P& p, double dt, const Geometry<T>& g, const Moti
 }
 
 // The whole law. dt = 0 evaluates the forces and leaves the spring as it is.
-template <class L, Account account, class P, class T>
+template <class L, Account account, class P, class T, class Spring>
 MORAINE_HD Action<T> contact_law(const P& p, double dt, const Geometry<T>& g, const Motion<T>& before,
-                                 const Motion<T>& now, Spring<T>& spring) {
+                                 const Motion<T>& now, Spring& spring) {
   Vec3<T> delta_t{};
   if constexpr (L::rubs) delta_t = carry(dt, g, slide(dt, g, before), spring.delta_t);
-  return act<L, account>(p, dt, g, now, delta_t, grip<L>(p, g, now, delta_t, spring.slipping), spring);
+  return act<L, account>(p, dt, g, now, delta_t, grip<L>(p, g, now, delta_t, spring), spring);
 }
 
 }  // namespace moraine::dem

@@ -3,7 +3,7 @@
 // slip.
 #pragma once
 #include "dem/law/geometry.hpp"
-#include "dem/law/parameters.hpp"
+#include "dem/law/part.hpp"
 
 namespace moraine::dem {
 
@@ -20,15 +20,21 @@ struct Coulomb {
     double mu_d = 0.3;    // dynamic friction
     bool operator==(const Parameters&) const = default;
     static constexpr auto list() {
-      return std::tuple{Parameter<Parameters>{"k_t", &Parameters::k_t},
-                        Parameter<Parameters>{"mu_s", &Parameters::mu_s},
-                        Parameter<Parameters>{"mu_d", &Parameters::mu_d}};
+      return std::tuple{Named{"k_t", &Parameters::k_t}, Named{"mu_s", &Parameters::mu_s},
+                        Named{"mu_d", &Parameters::mu_d}};
     }
   };
 
-  // Coulomb's limit, N.
   template <class T>
-  MORAINE_HD static T limit(const Parameters& p, const T& f_n, const T& /*slipping*/) {
+  struct Memory {
+    Vec3<T> delta_t{};  // m, tangential spring of i against j
+    static constexpr auto list() { return std::tuple{Named{"delta_t", &Memory::delta_t}}; }
+  };
+  static bool keeps(const Parameters& p) { return p.k_t > 0 && p.mu_s > 0; }
+
+  // Coulomb's limit, N.
+  template <class T, class Spring>
+  MORAINE_HD static T limit(const Parameters& p, const T& f_n, const Spring&) {
     return T(p.mu_s) * f_n;
   }
   static double stored(const Parameters& p, const Vec3d& delta_t) {
@@ -39,11 +45,16 @@ struct Coulomb {
 struct SofteningCoulomb : Coulomb {
   static constexpr bool softens = true;
 
-  static bool used(const Parameters& p) { return p.mu_d < p.mu_s; }
+  template <class T>
+  struct Memory {
+    T slipping{};  // 1 after a step that slipped, else 0
+    static constexpr auto list() { return std::tuple{Named{"slipping", &Memory::slipping}}; }
+  };
+  static bool keeps(const Parameters& p) { return p.mu_d < p.mu_s; }
 
   template <class T>
-  MORAINE_HD static T limit(const Parameters& p, const T& f_n, const T& slipping) {
-    return select(slipping > T(0), T(p.mu_d), T(p.mu_s)) * f_n;
+  MORAINE_HD static T limit(const Parameters& p, const T& f_n, const Memory<T>& spring) {
+    return select(spring.slipping > T(0), T(p.mu_d), T(p.mu_s)) * f_n;
   }
 };
 

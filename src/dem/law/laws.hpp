@@ -24,6 +24,25 @@ struct PartList {
                             Viscosity::Parameters::list(), Parts::Parameters::list()...);
     }
   };
+  // What a contact remembers, of all parts.
+  template <class T>
+  struct Memory : Coulomb::Memory<T>, SofteningCoulomb::Memory<T>, Parts::template Memory<T>... {
+    static constexpr auto list() {
+      return std::tuple_cat(Coulomb::Memory<T>::list(), SofteningCoulomb::Memory<T>::list(),
+                            Parts::template Memory<T>::list()...);
+    }
+  };
+  // use.operator()<Part>() for each part that remembers something.
+  template <class Use>
+  static constexpr void for_each_memory(Use&& use) {
+    use.template operator()<Coulomb>(), use.template operator()<SofteningCoulomb>();
+    (use.template operator()<Parts>(), ...);
+  }
+  // A list of each part's memory.
+  template <template <class> class List, class T>
+  using MemoryLists = std::tuple<List<Coulomb::Memory<T>>, List<SofteningCoulomb::Memory<T>>,
+                                 List<typename Parts::template Memory<T>>...>;
+
   using General = Law<LinearSpring, SofteningCoulomb, Viscosity, Parts...>;
   template <class L>
   static bool covered_by(const Parameters& p) {
@@ -33,6 +52,8 @@ struct PartList {
 using MoreParts = PartList<>;
 
 using ContactParameters = MoreParts::Parameters;
+template <class T>
+using Spring = MoreParts::Memory<T>;
 using GeneralLaw = MoreParts::General;  // also evaluates forces where speed is no matter (observe.cpp)
 
 template <class Friction, class Damping, class... More>

@@ -1,7 +1,7 @@
 // Normal force of a linear spring (Damsgaard et al. 2013, eq. 6): f_n = -k_n delta_n.
 #pragma once
 #include "dem/law/geometry.hpp"
-#include "dem/law/parameters.hpp"
+#include "dem/law/part.hpp"
 
 namespace moraine::dem {
 
@@ -9,7 +9,7 @@ struct LinearSpring {
   struct Parameters {
     double k_n = 1.16e9;  // N/m
     bool operator==(const Parameters&) const = default;
-    static constexpr auto list() { return std::tuple{Parameter<Parameters>{"k_n", &Parameters::k_n}}; }
+    static constexpr auto list() { return std::tuple{Named{"k_n", &Parameters::k_n}}; }
   };
 
   template <class T>

@@ -3,7 +3,7 @@
 // are foreseen (leapfrog.hpp).
 #pragma once
 #include "dem/law/geometry.hpp"
-#include "dem/law/parameters.hpp"
+#include "dem/law/part.hpp"
 
 namespace moraine::dem {
 
@@ -19,8 +19,7 @@ struct Viscosity {
     double gamma_t = 0;  // N s/m
     bool operator==(const Parameters&) const = default;
     static constexpr auto list() {
-      return std::tuple{Parameter<Parameters>{"gamma_n", &Parameters::gamma_n},
-                        Parameter<Parameters>{"gamma_t", &Parameters::gamma_t}};
+      return std::tuple{Named{"gamma_n", &Parameters::gamma_n}, Named{"gamma_t", &Parameters::gamma_t}};
     }
   };
   static bool used(const Parameters& p) { return p.gamma_n > 0 || p.gamma_t > 0; }
