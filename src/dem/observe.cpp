@@ -34,7 +34,7 @@ Velocities at_step(const Scene& scene, const State& s) {
   return w;
 }
 
-// Springs are left as they are, here and in contact_forces. A plane that is gone bears nothing.
+// Springs are left as they are, here and in for_each_contact. A plane that is gone bears nothing.
 std::vector<WallForce> wall_forces(const Scene& scene, const State& s, const Velocities& at) {
   std::vector<WallForce> out;
   const BodyMotion bodies = motion_of(scene, s);
@@ -48,6 +48,21 @@ std::vector<WallForce> wall_forces(const Scene& scene, const State& s, const Vel
     out.push_back({w.i, w.wall, std::abs(a.f[plane->axis]), a.f, plane->gap(g.x, g.r)});
   }
   return out;
+}
+
+// use(contact, geometry, force on i in N) for each grain contact.
+template <class Use>
+void for_each_contact(const Scene& scene, const State& s, Use&& use) {
+  const Sides sides = Sides::of(scene);
+  const Velocities at = at_step(scene, s);
+  for (const Contact& c : s.contacts) {
+    const Vec3d x_ij = nearest_image(sides, s.x[c.i] - s.x[c.j]);
+    const Geometry<double> g = between_grains(x_ij, s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]);
+    const Motion<double> motion{at.v[c.i] - at.v[c.j], at.omega[c.i], at.omega[c.j]};
+    Spring<double> spring = c.spring;
+    use(c, g,
+        contact_law<GeneralLaw, Account::none>(scene.with(Material::grain), 0, g, motion, motion, spring).f);
+  }
 }
 
 // Adds to `sum` what the next step has, both sorted by key; those that neither had before come in between.
@@ -70,31 +85,29 @@ void merge(std::vector<Force>& sum, const std::vector<Force>& next, Key&& key, A
 std::vector<Vec3d> velocity(const Scene& scene, const State& s) { return at_step(scene, s).v; }
 
 std::vector<ContactForce> contact_forces(const Scene& scene, const State& s) {
-  const Sides sides = Sides::of(scene);
-  const Velocities at = at_step(scene, s);
   std::vector<ContactForce> out;
   out.reserve(s.contacts.size());
-  for (const Contact& c : s.contacts) {
-    const Vec3d x_ij = nearest_image(sides, s.x[c.i] - s.x[c.j]);
-    const Geometry<double> g = between_grains(x_ij, s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]);
-    const Motion<double> motion{at.v[c.i] - at.v[c.j], at.omega[c.i], at.omega[c.j]};
-    Spring<double> spring = c.spring;
-    const Action<double> a =
-        contact_law<GeneralLaw, Account::none>(scene.with(Material::grain), 0, g, motion, motion, spring);
-    const Vec3d f_n = dot(a.f, g.n) * g.n;
-    out.push_back({c.i, c.j, s.x[c.i] - g.l_i * g.n, f_n, a.f - f_n, -g.delta_n});
-  }
+  for_each_contact(scene, s, [&](const Contact& c, const Geometry<double>& g, const Vec3d& f) {
+    const Vec3d f_n = dot(f, g.n) * g.n;
+    out.push_back({c.i, c.j, s.x[c.i] - g.l_i * g.n, f_n, f - f_n, -g.delta_n});
+  });
   return out;
 }
 
 void mark_slipping(const Scene& scene, State& s) {
   constexpr double rounding = 1e-12;  // of the force that slip leaves
-  const std::vector<ContactForce> forces = contact_forces(scene, s);
-  for (std::size_t k = 0; k < forces.size(); ++k) {
-    const double limit = (1 - rounding) * scene.with(Material::grain).mu_d;
-    const double f_t2 = dot(forces[k].f_t, forces[k].f_t), f_n2 = dot(forces[k].f_n, forces[k].f_n);
-    s.contacts[k].spring.slipping = f_t2 > 0 && f_t2 >= limit * limit * f_n2 ? 1 : 0;
-  }
+  const ContactParameters& p = scene.with(Material::grain);
+  std::vector<double> slipping;
+  for_each_contact(scene, s, [&](const Contact&, const Geometry<double>& g, const Vec3d& f) {
+    Vec3d f_n = dot(f, g.n) * g.n;
+    const Vec3d f_t = f - f_n;
+    if constexpr (GeneralLaw::has_more)
+      f_n -= GeneralLaw::more_normal(p, g) * g.n;  // the limit does not see it
+    const double limit = (1 - rounding) * p.mu_d;
+    const double f_t2 = dot(f_t, f_t), f_n2 = dot(f_n, f_n);
+    slipping.push_back(f_t2 > 0 && f_t2 >= limit * limit * f_n2 ? 1 : 0);
+  });
+  for (std::size_t k = 0; k < slipping.size(); ++k) s.contacts[k].spring.slipping = slipping[k];
 }
 
 Loads loads_of(const Scene& scene, const State& s) {
