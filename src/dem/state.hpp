@@ -1,7 +1,7 @@
 // The grains and all that must be known to go on from here with the same bits.
 //
-// Grains stand in "memory order" (spatially sorted, see order.hpp); `id` tells whose row it is. Within a
-// stage the state is staggered (leapfrog): positions, springs and forces belong to step n, velocities and
+// Grains stand in "memory order" (spatially sorted, see memory_order.hpp); `id` tells whose row it is. Within
+// a stage the state is staggered (leapfrog): positions, springs and forces belong to step n, velocities and
 // spins to n - 1/2. Between stages it is not: velocities and spins belong to n.
 #pragma once
 #include <array>

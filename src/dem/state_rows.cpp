@@ -1,6 +1,6 @@
 #include "dem/state_rows.hpp"
 
-#include "dem/order.hpp"
+#include "dem/memory_order.hpp"
 
 namespace moraine::dem {
 

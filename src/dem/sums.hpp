@@ -23,12 +23,13 @@ inline Index chunk_count(Index grains) { return (grains + chunk_size(grains) - 1
 
 // The order in which a grain adds up its contacts.
 struct ContactOrder {
-  Index chunk;  // grains in a chunk
+  Index chunk;  // grains in one, at most
 
   MORAINE_HD Index chunk_of(Index i) const { return i / chunk; }
+  MORAINE_HD Index begin_of(Index c) const { return c * chunk; }
   // Pairs of the other's chunk, which leave the share of i for it to collect.
-  MORAINE_HD bool comes_from_earlier_chunk(Index i, Index j) const { return j < i / chunk * chunk; }
-  MORAINE_HD int rank(Index i, Index j) const { return i / chunk == j / chunk ? 0 : j > i ? 1 : 2; }
+  MORAINE_HD bool comes_from_earlier_chunk(Index i, Index j) const { return j < begin_of(chunk_of(i)); }
+  MORAINE_HD int rank(Index i, Index j) const { return chunk_of(i) == chunk_of(j) ? 0 : j > i ? 1 : 2; }
   MORAINE_HD bool before(Index i, Index a, Index b) const {
     const int ra = rank(i, a), rb = rank(i, b);
     return ra != rb ? ra < rb : a < b;

@@ -6,8 +6,8 @@
 #include <functional>
 #include <random>
 
+#include "dem/memory_order.hpp"
 #include "dem/observe.hpp"
-#include "dem/order.hpp"
 #include "dem/packing.hpp"
 #include "run/schedule.hpp"
 

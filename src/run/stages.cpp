@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "dem/engine.hpp"
+#include "dem/memory_order.hpp"
 #include "dem/observe.hpp"
-#include "dem/order.hpp"
 #include "dem/packing.hpp"
 #include "error.hpp"
 #include "output/sealed.hpp"

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "dem/engine.hpp"
+#include "dem/memory_order.hpp"
 #include "dem/observe.hpp"
-#include "dem/order.hpp"
 #include "dem/packing.hpp"
 #include "dem/scene.hpp"
 #include "dem/state.hpp"

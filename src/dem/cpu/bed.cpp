@@ -18,7 +18,7 @@ std::vector<Chunk> chunks_of(const Bed& bed, const State& s, const BodyMotion& b
   for (Index c = 0; c < static_cast<Index>(chunks.size()); ++c) {
     Chunk& chunk = chunks[c];
     chunk.number = c;
-    chunk.begin = c * bed.chunk_size, chunk.end = std::min(bed.n, chunk.begin + bed.chunk_size);
+    chunk.begin = bed.order.begin_of(c), chunk.end = std::min(bed.n, bed.order.begin_of(c + 1));
     for (int k = 0; k < bodies.servos; ++k)
       for (Index i = chunk.begin; i < chunk.end; ++i)
         if (s.part_of[i] == bodies.servo[k].body) chunk.members[k].push_back(i);
@@ -41,7 +41,7 @@ void place_contacts(std::vector<Chunk>& chunks, const std::vector<Contact>& cont
 void place_plane_contacts(Bed& bed, const std::vector<WallContact>& contacts, const BodyMotion& bodies) {
   for (const WallContact& w : contacts)
     if (const Plane* plane = bodies.find(w.wall))
-      bed.chunks[w.i / bed.chunk_size].planes.push_back(
+      bed.chunks[bed.order.chunk_of(w.i)].planes.push_back(
           {w.i, static_cast<std::int32_t>(plane - bodies.plane), w.spring});
   for (Chunk& chunk : bed.chunks)
     std::ranges::sort(chunk.planes, {}, [](const PlanePair& p) { return std::tuple(p.i, p.plane); });
@@ -54,7 +54,7 @@ void Bed::load_state(const Scene& s, const State& state, const BodyMotion& bodie
   n = state.size();
   r_max = *std::max_element(state.r.begin(), state.r.end());
   margin = neighbour_margin(s, state);
-  chunk_size = dem::chunk_size(n);
+  order = {chunk_size(n)};
 
   part_of.set(state.part_of);
   grain.resize(n + 1), load.resize(n);

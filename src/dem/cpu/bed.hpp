@@ -65,7 +65,7 @@ struct Bed {
   Uses uses;
   Index n = 0;
   double r_max = 0, margin = 0;  // m
-  Index chunk_size = 0;
+  ContactOrder order{1};
   std::vector<Chunk> chunks;
   std::vector<Link> links;
   Host::Array<BodyId> part_of;

@@ -123,7 +123,7 @@ void find_candidates(const Host& space, Bed& bed, Neighbours<Host>& neighbours) 
           chunk.candidates[0].push_back({i, j, no_link, inside.of(i, j)});
           continue;
         }
-        const Index to = j / bed.chunk_size;
+        const Index to = bed.order.chunk_of(j);
         if (link_of[to] == no_link) {
           link_of[to] = static_cast<Index>(bed.links.size());
           bed.links.push_back({chunk.number, to, 0});

@@ -149,7 +149,7 @@ class Worker {
     if (!progress.take(step())) return;
     if (renew_) renew_near_pairs(bed_, c, control_.bodies, near_.margin);
     // Loads that are asked for after this step go to their own place, all others to a buffer.
-    const Waiting w{&c, grains_are_ahead_ ? buffers_.take(bed_.chunk_size) - c.begin : bed_.load.data()};
+    const Waiting w{&c, grains_are_ahead_ ? buffers_.take(bed_.order.chunk) - c.begin : bed_.load.data()};
     for (const ChunkTask task : tasks_.at_once) task(bed_, c, {control_.bodies, step(), dt(), w.load});
     progress.done.store(step(), std::memory_order_release);
     if (is_ready(c))
@@ -243,7 +243,7 @@ Schedule::Schedule(Bed& bed, int threads)
   for (int t = 0; t < threads; ++t)
     for (std::size_t c = chunks * t / threads; c < chunks * (t + 1) / threads; ++c) bed.chunks[c].owner = t;
   if (bed.uses.water)
-    for (Buffers& b : buffers_) b.push.resize(bed.chunk_size);
+    for (Buffers& b : buffers_) b.push.resize(bed.order.chunk);
 }
 
 Schedule::Pause Schedule::run(const StepTasks& tasks, Exchange& exchange, Control& control, NearMargin& near,

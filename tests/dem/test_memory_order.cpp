@@ -1,5 +1,5 @@
 // Sorting changes where grains stand in memory, nothing else.
-#include "dem/order.hpp"
+#include "dem/memory_order.hpp"
 
 #include <numeric>
 

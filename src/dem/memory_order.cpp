@@ -1,4 +1,4 @@
-#include "dem/order.hpp"
+#include "dem/memory_order.hpp"
 
 #include <algorithm>
 #include <numeric>
