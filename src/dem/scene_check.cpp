@@ -22,6 +22,8 @@ void check_bodies(const Scene& s, const State& state) {
     if (periodic)
       throw error("sides periodic along ", "xyz"[b.axis], " leave no room for ", name_of(id), ": take ",
                   "xyz"[b.axis], " out of box.periodic, or the wall away");
+    if (s.exchange_interval > 0 && !b.is_held(b.axis) && id != BodyId::top_wall)
+      throw error(name_of(id), ": moves, where pore water needs it to stand still");
     for (int a = 0; a < 3; ++a) {
       const Drive::Kind kind = b.along(a).kind;
       if (kind == Drive::Kind::free) throw error(name_of(id), ": a plane cannot be free along ", "xyz"[a]);

@@ -14,8 +14,8 @@ constexpr int most_servos = 4, most_planes = 6;
 struct Reaction {
   double force[most_servos] = {};    // N, on each servo's body along its axis
   double damping[most_servos] = {};  // N, the viscous part of it
-  double damping_power =
-      0;  // W, of viscous forces on grains, at the velocities of the step (a layer's: n - 1/2)
+  // W, of viscous forces on grains, at the velocities of the step (a layer's: n - 1/2).
+  double damping_power = 0;
 };
 
 // A plane where a step finds it.
@@ -25,8 +25,8 @@ struct Plane {
   std::int32_t axis = 2;
   double facing = 1;
   double place = 0;  // m, along the axis
-  Vec3d v{},
-      v_ahead{};  // m/s, at n - 1/2, and at n as foreseen before its forces are known (viscous contacts)
+  Vec3d v{};         // m/s, at n - 1/2
+  Vec3d v_ahead{};   // m/s, at n, as foreseen before the forces there are known (viscous contacts)
 
   MORAINE_HD double gap(const Vec3d& x, double r) const { return gap_to_plane(x[axis], r, place, facing); }
   MORAINE_HD Geometry<double> geometry(const Vec3d& x, double r) const {
