@@ -152,6 +152,10 @@ void check_stage(const Entries& entries, const Entries& above, const Context& co
   if (kind == "shear_stress")
     s.expect(s.number("stage.shear_stress") != 0, "stage.shear_stress", "other than 0 Pa");
 
+  if (kind == "shear" || kind == "shear_stress")
+    Reader(above).expect(Reader(above).text("box.walls").find('x') == string::npos, "box.walls",
+                         "none along x, where stage ", s.text("stage.name"), " moves a layer of grains");
+
   const string wall = s.text("stage.top_wall");
   if (kind == "uniaxial")
     s.expect(wall == "automatic", "stage.top_wall",

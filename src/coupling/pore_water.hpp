@@ -20,13 +20,13 @@
 
 #include "coupling/stability.hpp"
 #include "coupling/water.hpp"
+#include "dem/fluid_coupling.hpp"
 #include "dem/scene.hpp"
 #include "dem/state.hpp"
-#include "dem/surroundings.hpp"
 
 namespace moraine::coupling {
 
-class PoreWater : public dem::Surroundings {
+class PoreWater : public dem::FluidCoupling {
  public:
   virtual std::int64_t interval() const = 0;  // steps, chosen or checked
   virtual Stability stability() const = 0;

@@ -1,7 +1,7 @@
 // What all threads or blocks agree on. Each has a copy of its own, and all copies stay equal, because all
 // work it out from the same sums at the same step.
 #pragma once
-#include "dem/surroundings.hpp"
+#include "dem/fluid_coupling.hpp"
 
 namespace moraine::dem {
 

@@ -6,9 +6,9 @@
 #include <memory>
 #include <string>
 
+#include "dem/fluid_coupling.hpp"
 #include "dem/scene.hpp"
 #include "dem/state.hpp"
-#include "dem/surroundings.hpp"
 
 namespace moraine::dem {
 
@@ -19,8 +19,8 @@ class Engine {
   // Takes the state over. One that is not staggered gets its forces evaluated (springs as they are) and its
   // velocities taken half a step back; all others go on with the same bits. Throws Error on an unsupported
   // scene.
-  // surroundings: where scene.exchange_interval > 0, and then for as long as the engine runs.
-  virtual void load(const Scene& scene, const State& state, Surroundings* surroundings = nullptr) = 0;
+  // fluid: where scene.exchange_interval > 0, and then for as long as the engine runs.
+  virtual void load(const Scene& scene, const State& state, FluidCoupling* fluid = nullptr) = 0;
 
   // Advances so many steps. Throws Error naming grain, step and place when a number stops being finite or a
   // grain leaves.

@@ -19,12 +19,13 @@ namespace moraine::dem {
 struct Scene {
   Vec3d box{0, 0, 0};  // m; side lengths. z matters only where it is periodic.
   bool periodic_x = true, periodic_y = true, periodic_z = false;
-  double gravity = 9.80665;            // m/s2
-  double density = 2600;               // kg/m3, of the grains
-  double fluid_density = 0;            // kg/m3, of water that fills the pores; 0: dry
-  std::int64_t exchange_interval = 0;  // steps between exchanges with pore water (surroundings.hpp); 0: none
-  double dt = 0;                       // s
-  double time_0 = 0;                   // s, since the stage began, at step_0: where this dt began
+  double gravity = 9.80665;  // m/s2
+  double density = 2600;     // kg/m3, of the grains
+  double fluid_density = 0;  // kg/m3, of water that fills the pores; 0: dry
+  std::int64_t exchange_interval =
+      0;              // steps between exchanges with pore water (fluid_coupling.hpp); 0: none
+  double dt = 0;      // s
+  double time_0 = 0;  // s, since the stage began, at step_0: where this dt began
   std::int64_t step_0 = 0;
   // One row for each pair of a grain and what it touches, by that one's material.
   std::array<ContactParameters, materials> contact;

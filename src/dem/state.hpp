@@ -10,6 +10,7 @@
 
 #include "dem/body/body.hpp"
 #include "dem/law/laws.hpp"
+#include "dem/ledger.hpp"
 #include "dem/vec3.hpp"
 
 namespace moraine::dem {
@@ -27,17 +28,8 @@ struct WallContact {
   Spring<double> spring;
 };
 
-// Energy that has passed since the stage began, J. See observe.hpp for the balance.
-struct Ledger {
-  double slip = 0;           // dissipated by sliding friction
-  double viscous = 0;        // dissipated by gamma_n, gamma_t
-  double top_wall = 0;       // work done on the grains and the planes by what moves planes
-  double layers = 0;         // work done on the grains by the driven layers
-  double viscous_power = 0;  // W, at the present step
-  double water = 0;          // work done on the grains and the wall by pore water
-};
-
-// What pore water does at one step, beside its forces on grains; multiplied as those are (surroundings.hpp).
+// What pore water does at one step, beside its forces on grains; multiplied as those are
+// (fluid_coupling.hpp).
 struct WaterReaction {
   double wall = 0;          // N, on the top wall, upwards
   double layer = 0;         // N, x force on the grains of the top layer

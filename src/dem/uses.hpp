@@ -19,7 +19,8 @@ struct Uses {
   bool damping_ledger() const { return damped && ledger; }  // what viscous contacts take is worked out
 };
 
-inline Uses uses_of(const Scene& s) {
+// What its parameters ask for.
+inline Uses asked_by(const Scene& s) {
   const ContactParameters &grain = s.with(Material::grain), &wall = s.with(Material::wall);
   const auto any = [&](auto test) { return test(grain) || (s.has_planes() && test(wall)); };
   Uses u;
@@ -32,10 +33,10 @@ inline Uses uses_of(const Scene& s) {
   return u;
 }
 
-// Calls use.operator()<Row, account>() with the first row of CompiledLaws that has all the scene uses.
+// Calls use.operator()<Row, account>() with the first row of CompiledLaws that has all the scene asks for.
 template <class Use>
 void with_laws(const Scene& s, Use&& use) {
-  const Uses u = uses_of(s);
+  const Uses u = asked_by(s);
   const auto covers = [&]<class L>(bool damped, Material with, L*) {
     return L::rubs >= u.friction && L::softens >= u.softening && L::damps >= damped &&
            MoreParts::covered_by<L>(s.with(with));
@@ -55,7 +56,19 @@ void with_laws(const Scene& s, Use&& use) {
   const bool found = [&]<class... Rows>(std::tuple<Rows...>*) {
     return (try_row(static_cast<Rows*>(nullptr)) || ...);
   }(static_cast<CompiledLaws*>(nullptr));
-  if (!found) throw error("internal: no row of CompiledLaws has all that the scene uses");
+  if (!found) throw error("internal: no row of CompiledLaws has all that the scene asks for");
+}
+
+// What it asks for, and what else the row has that it takes.
+inline Uses uses_of(const Scene& s) {
+  Uses u = asked_by(s);
+  with_laws(s, [&]<class Row, Account>() {
+    using Grains = typename Row::BetweenGrains;
+    using Planes = typename Row::AtPlanes;
+    u.friction = Grains::rubs || Planes::rubs, u.softening = Grains::softens || Planes::softens;
+    u.damped_grains = Grains::damps, u.damped = Grains::damps || Planes::damps;
+  });
+  return u;
 }
 
 }  // namespace moraine::dem

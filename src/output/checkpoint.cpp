@@ -84,7 +84,7 @@ template <>
 constexpr std::tuple members<dem::Ledger>{
     Member{"slip", &dem::Ledger::slip},
     Member{"viscous", &dem::Ledger::viscous},
-    Member{"top_wall", &dem::Ledger::top_wall},
+    Member{"planes", &dem::Ledger::planes},
     Member{"layers", &dem::Ledger::layers},
     Member{"viscous_power", &dem::Ledger::viscous_power},
     Member{"water", &dem::Ledger::water},

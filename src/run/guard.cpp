@@ -29,8 +29,9 @@ void check_numbers(const Stage& stage, const dem::State& s) {
       throw error(grain_there(stage, s, i), "force or motion is not a finite number; try a smaller model.f");
   for (const dem::BodyState& body : s.bodies)
     if (!finite(body.x) || !finite(body.v) || !finite(body.force))
-      throw error("top wall or driven layer", when(stage, s), ": height ", s.wall_z(), " m, velocity ",
-                  s.at(dem::BodyId::top_wall).v.z, " m/s, layer velocity ", s.at(dem::BodyId::top_layer).v.x,
+      throw error("a wall or the driven layer", when(stage, s), ": height of the top wall ", s.wall_z(),
+                  " m, velocity ", s.at(dem::BodyId::top_wall).v.z, " m/s, layer velocity ",
+                  s.at(dem::BodyId::top_layer).v.x,
                   " m/s: not all finite numbers; try a smaller model.f or a heavier wall.mass");
   if (stage.scene.has(dem::BodyId::top_wall) && stage.scene.has(dem::BodyId::floor) && s.wall_z() <= 0)
     throw error("top wall", when(stage, s), ": it fell through the floor, to ", s.wall_z(),
@@ -42,10 +43,10 @@ double stored(const output::Row& r) {
 }
 
 // The measure of what is created or lost. Kinetic energies are v(n-1/2).v(n+1/2), which is negative for what
-// starts from rest; there is no motion then to measure by.
+// starts from rest; there is no motion then to measure by. Cohesion stores less than nothing.
 double stored_at_least(const output::Row& r) {
-  return std::max(0.0, r.kinetic) + std::max(0.0, r.rotational) + r.elastic_normal + r.elastic_tangential +
-         std::max(0.0, r.wall_kinetic);
+  return std::max(0.0, r.kinetic) + std::max(0.0, r.rotational) + std::max(0.0, r.elastic_normal) +
+         r.elastic_tangential + std::max(0.0, r.wall_kinetic);
 }
 
 dem::Index most_energetic(const dem::Scene& scene, const dem::State& s) {

@@ -50,7 +50,7 @@ output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, c
   row.potential = e.potential, row.wall_kinetic = e.wall_kinetic;
   row.water_work = l.water - l_0.water;
   row.slip = l.slip - l_0.slip, row.viscous = l.viscous - l_0.viscous;
-  row.top_wall_work = l.top_wall - l_0.top_wall, row.layers_work = l.layers - l_0.layers;
+  row.top_wall_work = l.planes - l_0.planes, row.layers_work = l.layers - l_0.layers;
   row.residue = stage.scene.ledger ? (e.total() - start.energy) + row.slip + row.viscous - row.top_wall_work -
                                          row.layers_work - row.water_work
                                    : std::numeric_limits<double>::quiet_NaN();

@@ -89,7 +89,7 @@ TEST(Energy, OfGrainsAndWaterIsKept) {
     const auto total = [&] {
       const State s = run.engine->state();
       const dem::Ledger& l = s.ledger;
-      return dem::observe(run.scene, s).energy.total() + l.slip - l.top_wall;
+      return dem::observe(run.scene, s).energy.total() + l.slip - l.planes;
     };
     const double start = total() + run.water->record(false).stored;
     run.advance(20000);

@@ -220,7 +220,7 @@ TEST(WideGrains, KeepEnergyWithTheWater) {
   WetRun run(bed, w);
   const auto total = [&] {
     const State s = run.engine->state();
-    return dem::observe(run.scene, s).energy.total() + s.ledger.slip - s.ledger.top_wall;
+    return dem::observe(run.scene, s).energy.total() + s.ledger.slip - s.ledger.planes;
   };
   const double start = total() + run.water->record(false).stored;
   run.advance(20000);

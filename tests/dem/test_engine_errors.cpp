@@ -72,7 +72,7 @@ TEST_P(EngineErrors, Bodies) {
 }
 
 // Something around the grains that fails at some exchange.
-struct Failing : Surroundings {
+struct Failing : FluidCoupling {
   int at;
   bool in_remap;
   int exchanges = 0;

@@ -35,6 +35,21 @@ TEST(Uses, SofteningTakesASmallerDynamicFriction) {
   EXPECT_FALSE(of({1e7, 0, 0, 0, 0.5, 0.3}).softening);  // no friction to soften
 }
 
+// Each of the laws that scenes without further parts ask for has a row of its own.
+TEST(Uses, NoMoreThanIsAskedFor) {
+  for (const double mu_d : {0.0, 0.3, 0.5})
+    for (const double mu_s : {0.0, 0.5})
+      for (const double gamma : {0.0, 5.0})
+        for (const double wall_gamma : {0.0, 5.0}) {
+          const Scene s = with({1e7, 1e7, gamma, 0, mu_s, mu_d}, {1e7, 0, wall_gamma, 0, 0, 0});
+          const Uses asked = asked_by(s), uses = uses_of(s);
+          EXPECT_EQ(asked.friction, uses.friction);
+          EXPECT_EQ(asked.softening, uses.softening);
+          EXPECT_EQ(asked.damped_grains, uses.damped_grains);
+          EXPECT_EQ(asked.damped, uses.damped);
+        }
+}
+
 // Damped walls, as in settling, leave the pairs of grains without viscous terms.
 TEST(Uses, DampedWallsAreNoMatterOfPairs) {
   const Uses u = of({1e7, 1e7, 0, 0, 0.5, 0.5}, {1e7, 0, 100, 0, 0, 0});

@@ -50,7 +50,7 @@ inline dem::State random_state(RandomNumbers& number, dem::Index n) {
   if (n > 0) s.wall_contacts.push_back({0, dem::BodyId::top_wall, number.vector(), 0});
   for (dem::BodyState& body : s.bodies) body = {number.vector(), number.vector(), number.vector()};
   for (double* value :
-       {&s.ledger.slip, &s.ledger.viscous, &s.ledger.top_wall, &s.ledger.layers, &s.ledger.viscous_power}) {
+       {&s.ledger.slip, &s.ledger.viscous, &s.ledger.planes, &s.ledger.layers, &s.ledger.viscous_power}) {
     *value = number();
   }
   s.step = (std::int64_t{1} << 53) + 1;

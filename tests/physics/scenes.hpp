@@ -178,7 +178,7 @@ inline void expect_same_bits(const State& a, const State& b) {
   same(members(a.wall_contacts), members(b.wall_contacts), "wall_contacts");
   const auto numbers = [](const State& s) {
     const Ledger& l = s.ledger;
-    return std::vector<double>{l.slip, l.viscous, l.top_wall, l.layers, l.viscous_power};
+    return std::vector<double>{l.slip, l.viscous, l.planes, l.layers, l.viscous_power};
   };
   same(a.bodies, b.bodies, "bodies"), same(numbers(a), numbers(b), "ledger");
   EXPECT_EQ(a.step, b.step);

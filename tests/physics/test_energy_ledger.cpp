@@ -7,7 +7,7 @@ namespace {
 
 double balance(const Scene& scene, const State& s) {
   const Ledger& l = s.ledger;
-  return observe(scene, s).energy.total() + l.slip + l.viscous - l.top_wall - l.layers;
+  return observe(scene, s).energy.total() + l.slip + l.viscous - l.planes - l.layers;
 }
 
 struct Variant {
@@ -42,7 +42,7 @@ Residue residue(Engine& engine, Bed bed, int finer) {
     const State now = engine.state();
     const Ledger& l = now.ledger;
     out.largest = std::max(out.largest, std::abs(balance(bed.scene, now) - start));
-    out.turnover = l.slip + l.viscous + std::abs(l.top_wall) + std::abs(l.layers);
+    out.turnover = l.slip + l.viscous + std::abs(l.planes) + std::abs(l.layers);
   }
   return out;
 }

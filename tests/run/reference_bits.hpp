@@ -95,7 +95,7 @@ inline void feed_state(const output::Checkpoint& c, Digest& grains, Digest& cont
     water.feed(passed);
 
   const dem::Ledger& l = s.ledger;
-  for (const double joule : {l.slip, l.viscous, l.top_wall, l.layers, l.viscous_power, l.water})
+  for (const double joule : {l.slip, l.viscous, l.planes, l.layers, l.viscous_power, l.water})
     ledger.feed(joule);
 }
 

@@ -204,7 +204,7 @@ TEST(Guard, NumbersThatAreNotFinite) {
   bad = good, bad.rotation[0].z = infinity;
   EXPECT_NE(check(bad).find("grain 5 at step 0"), std::string::npos);
   bad = good, bad.at(dem::BodyId::top_wall).v.z = nan;
-  EXPECT_NE(check(bad).find("top wall or driven layer at step 0"), std::string::npos);
+  EXPECT_NE(check(bad).find("a wall or the driven layer at step 0"), std::string::npos);
   bad = good, bad.wall_z() = -1;
   EXPECT_NE(check(bad).find("fell through the floor"), std::string::npos);
 }

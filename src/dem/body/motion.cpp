@@ -85,6 +85,7 @@ BodyMotion motion_of(const Scene& scene, const State& s) {
 void store(const BodyMotion& m, State& s) {
   for (int k = 0; k < m.planes; ++k) {
     const Plane& p = m.plane[k];
+    s.at(p.id) = {};
     s.at(p.id).x[p.axis] = p.place;
   }
   for (int k = 0; k < m.servos; ++k) {

@@ -79,7 +79,7 @@ struct BodyMotion {
       const double by_drive =
           b.by_stress() ? b.facing * b.work(0.5 * (b.stress_before + b.stress) * s.area(), s.dt)
                         : -b.work(0.5 * ((b.force_before + b.force) + (b.water_before + b.water)), s.dt);
-      (b.is_plane() ? ledger.top_wall : ledger.layers) += by_drive;
+      (b.is_plane() ? ledger.planes : ledger.layers) += by_drive;
     }
     const double power = viscous_power();
     ledger.viscous += 0.5 * (ledger.viscous_power + power) * s.dt;

@@ -3,8 +3,8 @@
 #include "dem/body/plane_contact.hpp"
 #include "dem/cpu/rows.hpp"
 #include "dem/cpu/tasks.hpp"
+#include "dem/fluid_coupling.hpp"
 #include "dem/leapfrog.hpp"
-#include "dem/surroundings.hpp"
 
 namespace moraine::dem::cpu {
 

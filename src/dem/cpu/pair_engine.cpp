@@ -1,15 +1,15 @@
 // The CPU's engine: each pair of near grains once, as many at a time as there are SIMD lanes. Its rooms:
 //
-//   bed.hpp          rows of grains, chunks, links
-//   lists.hpp        candidates and near pairs; pair_list.hpp
-//   tasks.hpp        the tasks of a step: pair_forces.cpp, body_forces.cpp, motion.cpp
-//   exchange.hpp     meeting the pore water
-//   schedule.hpp     which thread does what, when
+//   bed.hpp              rows of grains, chunks, links
+//   neighbour_lists.hpp  candidates and near pairs; pair_list.hpp
+//   tasks.hpp            the tasks of a step: pair_forces.cpp, body_forces.cpp, motion.cpp
+//   water_exchange.hpp   meeting the pore water
+//   schedule.hpp         which thread does what, when
 #include <algorithm>
 #include <memory>
 
 #include "backend/team.hpp"
-#include "dem/cpu/lists.hpp"
+#include "dem/cpu/neighbour_lists.hpp"
 #include "dem/cpu/schedule.hpp"
 #include "dem/scene_check.hpp"
 #include "dem/state_rows.hpp"
@@ -22,7 +22,7 @@ class PairEngine final : public Engine {
  public:
   explicit PairEngine(int threads) : threads_wanted_(threads) { space_.threads = std::max(1, threads); }
 
-  void load(const Scene& scene, const State& state, Surroundings* surroundings) override;
+  void load(const Scene& scene, const State& state, FluidCoupling* fluid) override;
   void advance(std::int64_t steps) override;
   State state() const override;
   Counts counts() const override;
@@ -46,7 +46,7 @@ class PairEngine final : public Engine {
   State kept_;  // what no step changes: ids, x_start, bodies that do not move
 };
 
-void PairEngine::load(const Scene& scene, const State& s, Surroundings* surroundings) {
+void PairEngine::load(const Scene& scene, const State& s, FluidCoupling* fluid) {
   check_scene(scene, s);
   kept_ = {};
   kept_.id = s.id, kept_.x_start = s.x_start, kept_.bodies = s.bodies;
@@ -58,7 +58,7 @@ void PairEngine::load(const Scene& scene, const State& s, Surroundings* surround
   bed_ = {};
   bed_.load_state(scene, s, control_.bodies);
   tasks_ = tasks_for(scene);
-  exchange_ = std::make_unique<Exchange>(bed_.uses.water ? surroundings : nullptr, s.water);
+  exchange_ = std::make_unique<Exchange>(bed_.uses.water ? fluid : nullptr, s.water);
   schedule_ = std::make_unique<Schedule>(bed_, space_.threads);
   searches_ = 0;
   search();

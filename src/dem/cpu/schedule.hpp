@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "dem/control.hpp"
-#include "dem/cpu/exchange.hpp"
-#include "dem/cpu/lists.hpp"
+#include "dem/cpu/neighbour_lists.hpp"
 #include "dem/cpu/tasks.hpp"
+#include "dem/cpu/water_exchange.hpp"
 
 namespace moraine::dem::cpu {
 

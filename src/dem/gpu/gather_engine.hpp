@@ -50,14 +50,14 @@ class GatherEngine final : public Engine {
  public:
   GatherEngine(Space space, std::string name) : space_(std::move(space)), name_(std::move(name)) {}
 
-  void load(const Scene& scene, const State& s, Surroundings* surroundings) override {
+  void load(const Scene& scene, const State& s, FluidCoupling* fluid) override {
     check_scene(scene, s);
     kept_ = {};
     kept_.id = s.id, kept_.x_start = s.x_start, kept_.part_of = s.part_of, kept_.bodies = s.bodies;
     n_ = s.size();
     r_max_ = *std::max_element(s.r.begin(), s.r.end());
     uses_ = uses_of(scene);
-    surroundings_ = uses_.water ? surroundings : nullptr;
+    fluid_ = uses_.water ? fluid : nullptr;
     Control control;
     control.bodies = motion_of(scene, s);
     control.water = s.water;
@@ -82,11 +82,11 @@ class GatherEngine final : public Engine {
       // Not all at once, for engines that share a card and do not fit side by side.
       std::int64_t target = std::min(end, control.bodies.step + 4096);
       const std::int64_t m = view_.scene.exchange_interval;
-      if (surroundings_) target = std::min(target, (control.bodies.step / m + (control.stale ? 0 : 1)) * m);
+      if (fluid_) target = std::min(target, (control.bodies.step / m + (control.stale ? 0 : 1)) * m);
       launch(view_, std::max(target, control.bodies.step));
       control = space_.read(control_.data());
       if (!control.stale) {
-        if (surroundings_ && exchanges(view_.scene, control.bodies.step)) exchange();
+        if (fluid_ && exchanges(view_.scene, control.bodies.step)) exchange();
         continue;
       }
       check_lost(control);
@@ -103,7 +103,7 @@ class GatherEngine final : public Engine {
     BodyMotion bodies = control.bodies;
     const std::vector<GrainRow> grains = grain_[bodies.step & 1].get();
     const std::vector<LoadRow> loads = load_.get();
-    if (surroundings_)
+    if (fluid_)
       for (const WaterRow& w : water_.get()) s.water_force.push_back(w.f);
     if (!control.closed) {
       const Tally total = sums(bodies.step);
@@ -144,7 +144,7 @@ class GatherEngine final : public Engine {
       tally_[parity].set(std::vector<Tally>(view_.groups())), chunk_tally_[parity].resize(view_.chunks());
     }
     grain_[s.step & 1].set(grain_rows(view_.scene, s));
-    std::vector<WaterRow> water(surroundings_ ? n_ : 0);
+    std::vector<WaterRow> water(fluid_ ? n_ : 0);
     if (s.staggered)
       for (std::size_t i = 0; i < water.size(); ++i) water[i] = {s.water_force[i], 0};
     water_.set(water);
@@ -161,7 +161,7 @@ class GatherEngine final : public Engine {
       view_.grain[parity] = grain_[parity].data(), view_.now[parity] = now_[parity].data();
       view_.tally[parity] = tally_[parity].data(), view_.chunk_tally[parity] = chunk_tally_[parity].data();
     }
-    view_.water = surroundings_ ? water_.data() : nullptr;
+    view_.water = fluid_ ? water_.data() : nullptr;
     view_.load = load_.data(), view_.part_of = part_of_.data(), view_.control = control_.data();
     view_.row = lists_.row.data(), view_.neighbour = lists_.neighbour.data();
     view_.spring = spring_.data(), view_.plane_spring = plane_spring_.data();
@@ -210,7 +210,7 @@ class GatherEngine final : public Engine {
       now_[control.bodies.step & 1].set(now);
     }
     evaluate(control);
-    if (surroundings_) exchange();
+    if (fluid_) exchange();
     control = space_.read(control_.data());
     BodyMotion& bodies = control.bodies;
     const Reaction reaction = view_.tallies.reaction(sums(bodies.step));
@@ -218,8 +218,7 @@ class GatherEngine final : public Engine {
     std::vector<LoadRow> loads = load_.get();
     const std::vector<WaterRow> water = water_.get();
     for (Index i = 0; i < n_; ++i) {
-      const LoadRow whole =
-          surroundings_ ? with_water(view_.scene, bodies.step, loads[i], water[i].f) : loads[i];
+      const LoadRow whole = fluid_ ? with_water(view_.scene, bodies.step, loads[i], water[i].f) : loads[i];
       half_step_back(view_.scene, grains[i], whole);
       loads[i].slip = 0;
     }
@@ -239,11 +238,11 @@ class GatherEngine final : public Engine {
   void exchange() {
     Control control = space_.read(control_.data());
     const std::vector<GrainRow> grains = grain_[control.bodies.step & 1].get();
-    if (surroundings_->stale()) surroundings_->remap(grains.data(), control.bodies);
-    for (Index c = 0; c < view_.chunks(); ++c) surroundings_->displace(c, grains.data());
-    control.water = surroundings_->solve(control.bodies, view_.scene.time(control.bodies.step));
+    if (fluid_->stale()) fluid_->remap(grains.data(), control.bodies);
+    for (Index c = 0; c < view_.chunks(); ++c) fluid_->displace(c, grains.data());
+    control.water = fluid_->solve(control.bodies, view_.scene.time(control.bodies.step));
     std::vector<WaterRow> water(n_);
-    for (Index c = 0; c < view_.chunks(); ++c) surroundings_->push(c, grains.data(), water.data());
+    for (Index c = 0; c < view_.chunks(); ++c) fluid_->push(c, grains.data(), water.data());
     water_.set(water), control_.set({control});
     refresh_view();
   }
@@ -276,7 +275,7 @@ class GatherEngine final : public Engine {
   Index n_ = 0;
   double r_max_ = 0;
   Uses uses_;
-  Surroundings* surroundings_ = nullptr;
+  FluidCoupling* fluid_ = nullptr;
   GatherView view_;
   Neighbours<Space> lists_, old_lists_;
   Array<GrainRow> grain_[2];

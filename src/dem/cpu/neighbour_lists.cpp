@@ -1,4 +1,4 @@
-#include "dem/cpu/lists.hpp"
+#include "dem/cpu/neighbour_lists.hpp"
 
 #include <algorithm>
 #include <limits>

@@ -9,7 +9,7 @@
 //   push()     for each chunk, after solve(): the force f on each of its grains, N
 //
 // Leapfrog then adds the impulse m f dt on this step and none on the m - 1 others (an impulse
-// multiple-time-step scheme), so that what the grains gain is what the surroundings lose.
+// multiple-time-step scheme), so that what the grains gain is what the fluid loses.
 #pragma once
 #include <cstdint>
 
@@ -34,9 +34,9 @@ MORAINE_HD LoadRow with_water(const Scene& scene, std::int64_t step, LoadRow loa
   return load;
 }
 
-class Surroundings {
+class FluidCoupling {
  public:
-  virtual ~Surroundings() = default;
+  virtual ~FluidCoupling() = default;
 
   virtual bool stale() const = 0;  // changes in solve() only
   virtual void remap(const GrainRow* grains, const BodyMotion& bodies) = 0;

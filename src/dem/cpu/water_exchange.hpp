@@ -1,7 +1,7 @@
-// How the threads of the CPU's engine meet the pore water (surroundings.hpp). The thread that is last to say
-// where its grains went solves for the pressure, while others go on to their pairs.
+// How the threads of the CPU's engine meet the pore water (fluid_coupling.hpp). The thread that is last to
+// say where its grains went solves for the pressure, while others go on to their pairs.
 //
-// An exception that left a team of threads would end the program without a word: what surroundings throw is
+// An exception that left a team of threads would end the program without a word: what the fluid throws is
 // kept until all threads have met at a barrier. A step number goes with it, for one thread may fail at the
 // next step before another has looked whether this one went well.
 #pragma once
@@ -16,24 +16,21 @@ namespace moraine::dem::cpu {
 
 class Exchange {
  public:
-  // surroundings: null where the bed is dry.
-  Exchange(Surroundings* surroundings, const WaterReaction& last)
-      : surroundings_(surroundings), reaction_(last) {}
+  // fluid: null where the bed is dry.
+  Exchange(FluidCoupling* fluid, const WaterReaction& last) : fluid_(fluid), reaction_(last) {}
 
   const WaterReaction& reaction() const { return reaction_; }  // of the last exchange
-  bool stale() const { return surroundings_->stale(); }
+  bool stale() const { return fluid_->stale(); }
 
   // New weights, where the old ones have run out; all threads come here. False: it failed.
   bool remap(const Bed& bed, const BodyMotion& bodies, bool leader, Barrier& barrier);
-  void displace(const Bed& bed, const Chunk& chunk) {
-    surroundings_->displace(chunk.number, bed.grain.data());
-  }
+  void displace(const Bed& bed, const Chunk& chunk) { fluid_->displace(chunk.number, bed.grain.data()); }
   // Once a thread has displaced all its chunks.
   void arrive(const Bed& bed, const BodyMotion& bodies, int threads);
   bool is_solved(std::int64_t step) const { return solved_.load(std::memory_order_acquire) == step; }
   // push: by grain, though only rows of the chunk's grains need exist.
   void push(const Bed& bed, const Chunk& chunk, WaterRow* push) {
-    surroundings_->push(chunk.number, bed.grain.data(), push);
+    fluid_->push(chunk.number, bed.grain.data(), push);
   }
   // All of it by one thread, with the grains at rest in between: what the pressures of the start do.
   void alone(Bed& bed, const BodyMotion& bodies);
@@ -54,7 +51,7 @@ class Exchange {
   }
 
   static constexpr std::int64_t never = INT64_MAX;
-  Surroundings* surroundings_;
+  FluidCoupling* fluid_;
   WaterReaction reaction_;
   std::exception_ptr failure_;
   std::atomic<std::int64_t> failed_{never};
