@@ -141,10 +141,13 @@ TEST_P(SideWall, AndFloorBearTheWeight) {
     for (const ContactForce& c : loads.contacts) mean_force += length(c.f_n) / loads.contacts.size();
     const double unbalanced = observe(s, now, loads).unbalanced_force;
     const double bound = unbalanced * mean_force * now.size();
-    ASSERT_LT(bound, 0.005 * weight);
+    ASSERT_LT(bound, 0.02 * weight);
     std::printf("mu %.1f: floor %.5f, side walls %.5f of the weight; bound %.1e\n", mu, b.floor / weight,
                 b.friction / weight, bound / weight);
     EXPECT_NEAR(b.floor + b.friction, weight, bound);
+    double on_grains = 0;  // among themselves they press nobody down; loads have speeds half a step later
+    for (const Vec3d& f : now.force) on_grains += f.z;
+    EXPECT_NEAR((b.floor + b.friction) / on_grains, 1, 1e-6);
     EXPECT_LT(length(b.sideways), bound);
     EXPECT_NEAR(observe(s, now, loads).normal_stress * s.area() / b.floor, 1, 1e-12);
     if (mu == 0) {
