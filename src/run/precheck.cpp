@@ -120,11 +120,12 @@ void check_cells(const Stage& stage, const dem::State& s, std::vector<std::strin
         "; expected cells of at least ", d, " m, unless the flow around large grains is to be resolved"));
 }
 
-// There are no walls along x and y.
+// Where no walls stand along x or y.
 void check_sides(const cases::Case& c, const Stage& stage, std::vector<std::string>& warnings) {
   if (!stage.water.present) return;
   for (int a = 0; a < 2; ++a) {
     if (a == 0 ? stage.scene.periodic_x : stage.scene.periodic_y) continue;
+    if (stage.scene.has(a == 0 ? dem::BodyId::x_low : dem::BodyId::y_low)) continue;
     const auto tight = [&](const fluid::Side& side) { return side.kind == fluid::Side::Kind::closed; };
     const bool low = tight(stage.water.sides.low[a]), high = tight(stage.water.sides.high[a]);
     const std::string key = std::string("fluid.") + "xy"[a];
