@@ -122,7 +122,7 @@ TEST_F(Errors, KeysAboutSomething) {
   EXPECT_EQ(keys({"WALL"}), wall);
   EXPECT_EQ(keys({"normal stress", "amplitude"}), keys({"normal_stress_amplitude"}));
   EXPECT_EQ(keys({"stage.shear.hold_layer_height"}), keys({"stage.hold_layer_height"}));
-  expect_error({"keys", "walll"}, {"keys walll: no key has this word", "did you mean wall?"});
+  expect_error({"keys", "walk"}, {"keys walk: no key has this word", "did you mean wall?"});
   expect_error({"keys", "wall", "zzz"},
                {"keys wall zzz: no key has these words", "`moraine keys` lists all"});
 }
