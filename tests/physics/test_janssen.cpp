@@ -6,7 +6,7 @@
 namespace moraine::dem {
 namespace {
 
-constexpr double mu = 0.1;  // of the walls: rougher ones let grains roll along them, which mobilises less
+constexpr double mu = 0.1;  // of the walls; with 0.25 only 60 to 90 % of the friction is called up
 
 // Filled, then the floor goes down slowly, which makes the grains slide along the walls: means over the
 // second half of that way.
