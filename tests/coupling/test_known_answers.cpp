@@ -23,12 +23,14 @@ struct Column {
   static constexpr double m_v =
       (layers + 1) * d * d / k_n / height;  // 1/Pa: so many springs above one another
 
-  static WetBed bed() {
+  static WetBed bed(bool walled = false) {
     WetBed bed;
     Scene& s = bed.scene;
     s.box = {columns * d, columns * d, 1};
+    if (walled) dem::put_side_walls(s);
     s.gravity = 0;
     s.contact.fill(dem::LinearContact{k_n, k_n, 20, 10, 100, 100});
+    if (walled) s.with(dem::Material::wall) = dem::LinearContact{k_n, 0, 20, 0, 0, 0};
     s.dt = 0.1 * std::sqrt(dem::mass(s, d / 2) / k_n);
     s.body(dem::BodyId::top_wall) = dem::wall_pressed_by(sigma_0, 1);
     State& state = bed.state;
@@ -86,8 +88,7 @@ double terzaghi_settlement(double t) {
 }
 
 // The whole step of stress is in the water to begin with, so that the column does not swing.
-TEST(Terzaghi, ConsolidationOfGrains) {
-  const WetBed bed = loaded(Column::bed());
+void expect_consolidation(const WetBed& bed) {
   const Scene& s = bed.scene;
   constexpr double height = Column::height, m_v = Column::m_v;
   const double phi = mean_porosity(bed);
@@ -112,6 +113,10 @@ TEST(Terzaghi, ConsolidationOfGrains) {
     EXPECT_NEAR(settlement / terzaghi_settlement(t), 1, 0.05) << "T = " << t;
   }
 }
+TEST(Terzaghi, ConsolidationOfGrains) { expect_consolidation(loaded(Column::bed())); }
+
+// Smooth walls bear nothing along z, whatever they press.
+TEST(Terzaghi, ConsolidationBetweenSideWalls) { expect_consolidation(loaded(Column::bed(true))); }
 
 // How a packing gives way under the step of stress without water: m, downwards, at heights z.
 struct Squeeze {
@@ -188,9 +193,9 @@ struct Layered {
   }
 };
 
-TEST(Terzaghi, ConsolidationOfARandomPacking) {
-  const WetBed bed = loaded(tall_bed());
-  const Squeeze dry(tall_bed());
+void expect_consolidation_of_a_packing(const WetBed& packing) {
+  const WetBed bed = loaded(packing);
+  const Squeeze dry(packing);
   const double phi = mean_porosity(bed), height = dry.height();
   Water w = water_over(bed);
   w.cells = {2, 2, 10};
@@ -216,6 +221,12 @@ TEST(Terzaghi, ConsolidationOfARandomPacking) {
     EXPECT_LT(worst, 0.02) << "T = " << t;
     EXPECT_NEAR(settlement / answer.settlement(), 1, 0.03) << "T = " << t;
   }
+}
+
+TEST(Terzaghi, ConsolidationOfARandomPacking) { expect_consolidation_of_a_packing(tall_bed()); }
+
+TEST(Terzaghi, ConsolidationOfARandomPackingBetweenSideWalls) {
+  expect_consolidation_of_a_packing(make_bed(900, 5, 1e4, 0, true));
 }
 
 // 1/s, at which the mean pressure over a closed floor and under a drained top falls once it falls evenly.

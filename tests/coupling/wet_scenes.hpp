@@ -55,8 +55,9 @@ inline State with_boulders(const State& s, double radius, double width) {
 }
 
 // Grains of 2 cm settled under gravity, x and y periodic; then, with a stress, pressed by a wall without
-// gravity. At rest.
-inline WetBed make_bed(int count, int columns, double normal_stress, double boulders = 0) {
+// gravity. At rest. walled: between four smooth walls in place of periodic sides.
+inline WetBed make_bed(int count, int columns, double normal_stress, double boulders = 0,
+                       bool walled = false) {
   dem::Packing p;
   p.count = count, p.columns_x = p.columns_y = columns;
   p.radius_mean = 0.01, p.radius_std = 0.0008, p.cell = 1.05, p.seed = 5;
@@ -65,6 +66,10 @@ inline WetBed make_bed(int count, int columns, double normal_stress, double boul
   Scene& s = bed.scene;
   s.box = {lattice.box_x, lattice.box_y, 1};
   s.contact.fill(dem::LinearContact{1e6, 1e6, 50, 20, 0.3, 0.3});
+  if (walled) {
+    dem::put_side_walls(s);
+    s.with(dem::Material::wall) = dem::LinearContact{1e6, 0, 50, 0, 0, 0};
+  }
   s.dt = 0.1 * std::sqrt(dem::mass(s, 0.008) / s.with(dem::Material::grain).k_n);
   State state = boulders > 0 ? with_boulders(lattice.state, boulders, lattice.box_x) : lattice.state;
   dem::sort_spatially(s, state);
@@ -81,7 +86,8 @@ inline WetBed make_bed(int count, int columns, double normal_stress, double boul
     state = dem::run(*engine, s, state, 60000);
     dem::synchronise(s, state);
     // Locked, so that it is elastic and comes to rest: sliding contacts creep for long.
-    for (dem::ContactParameters& p : s.contact) p.mu_s = p.mu_d = 100;
+    for (dem::ContactParameters& p : s.contact)
+      if (p.mu_s > 0) p.mu_s = p.mu_d = 100;
     state = at_rest(s, state);
   }
   dem::sort_spatially(s, state);
@@ -94,7 +100,11 @@ inline const WetBed& pressed_bed() {
   static const WetBed bed = make_bed(800, 8, 1e4);
   return bed;
 }
-// The same with two boulders, as wide as two cells of water_over().
+inline const WetBed& walled_bed() {  // the same between four walls
+  static const WetBed bed = make_bed(800, 8, 1e4, 0, true);
+  return bed;
+}
+// The first with two boulders, as wide as two cells of water_over().
 inline const WetBed& boulder_bed() {
   static const WetBed bed = make_bed(800, 8, 1e4, 0.045);
   return bed;

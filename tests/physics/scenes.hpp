@@ -104,9 +104,8 @@ inline const Bed& settled_bed() {
   return bed;
 }
 
-// The settled bed sheared by its top layer under a loaded wall, with everything the contact law can do.
-inline Bed sheared_bed() {
-  Bed bed = settled_bed();
+// Sheared by its top layer under a loaded wall, with everything the contact law can do.
+inline void shear(Bed& bed) {
   Scene& s = bed.scene;
   State& state = bed.state;
   double top = 0;
@@ -119,6 +118,62 @@ inline Bed sheared_bed() {
   s.with(Material::grain).gamma_n = s.with(Material::grain).gamma_t = 0;
   s.body(BodyId::top_wall) = wall_pressed_by(500, 0.5);
   drive_top_layer(s, Drive::at(0.2));
+}
+inline Bed sheared_bed() {
+  Bed bed = settled_bed();
+  shear(bed);
+  return bed;
+}
+
+// Planes at both sides of these axes, which are periodic no longer.
+inline void put_side_walls(Scene& s, bool along_x = true, bool along_y = true) {
+  if (along_x) {
+    s.periodic_x = false;
+    s.body(BodyId::x_low) = plane(0, 1), s.body(BodyId::x_high) = plane(0, -1, s.box.x);
+  }
+  if (along_y) {
+    s.periodic_y = false;
+    s.body(BodyId::y_low) = plane(1, 1), s.body(BodyId::y_high) = plane(1, -1, s.box.y);
+  }
+}
+
+// Grains of 2 cm that have settled between four side walls, some 1.2 diameters apart for each column.
+inline Bed column_between_walls(Index count, int columns, double wall_mu, std::int64_t steps) {
+  Packing p;
+  p.count = count, p.columns_x = p.columns_y = columns;
+  p.radius_mean = 0.01, p.radius_std = 0.0005, p.cell = 1.06, p.seed = 3;
+  const Lattice lattice = make_lattice(p);
+  Bed bed{{}, lattice.state};
+  Scene& s = bed.scene;
+  s.box = {lattice.box_x, lattice.box_y, 1};
+  put_side_walls(s);
+  s.contact.fill(LinearContact{1e5, 1e5, 20, 8, 0.5, 0.5});
+  s.with(Material::wall).mu_s = s.with(Material::wall).mu_d = wall_mu;
+  s.dt = 0.1 * std::sqrt(mass(s, 0.008) / s.with(Material::grain).k_n);
+  sort_spatially(s, bed.state);
+  bed.state = run(*make_engine(Backend::cpu, 1), s, bed.state, steps);
+  synchronise(s, bed.state);
+  bed.state.step = 0, bed.state.ledger = {};
+  return bed;
+}
+inline const Bed& walled_bed() {  // as many grains as the settled bed
+  static const Bed bed = column_between_walls(300, 5, 0.4, 45000);
+  return bed;
+}
+// Its side wall moves in: 0.5 mm in a hundredth of a second.
+inline Bed squeezed_bed() {
+  Bed bed = walled_bed();
+  bed.scene.body(BodyId::x_low).x = Drive::at(0.05);
+  return bed;
+}
+// Sheared by its top layer along the walls at y; x is periodic.
+inline Bed sheared_between_walls() {
+  Bed bed = walled_bed();
+  bed.scene.periodic_x = true;
+  bed.scene.body(BodyId::x_low) = bed.scene.body(BodyId::x_high) = {};
+  std::erase_if(bed.state.wall_contacts,
+                [](const WallContact& c) { return c.wall == BodyId::x_low || c.wall == BodyId::x_high; });
+  shear(bed);
   return bed;
 }
 

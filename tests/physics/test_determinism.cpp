@@ -24,7 +24,9 @@ const std::vector<Named>& scenes() {
                          {"damped grains", sheared_bed()},
                          {"no friction", sheared_bed()},
                          {"cloud", cloud(700, 0.2, 5)},
-                         {"small box", cloud(22, 0.065, 5)}};
+                         {"small box", cloud(22, 0.065, 5)},
+                         {"a side wall moves in", squeezed_bed()},
+                         {"sheared along side walls", sheared_between_walls()}};
     for (ContactParameters& p : a[1].bed.scene.contact) p.mu_d = 0.3;
     drive_top_layer(a[2].bed.scene, Drive::by(400));
     damp_grains(a[2].bed.scene, 5);
@@ -101,12 +103,12 @@ TEST(Blocks, OneTwoFour) {
   }
 }
 
-TEST(Threads, OneTwoFour) {
+TEST(Threads, OneToFour) {
   for (const Named& scene : scenes()) {
     SCOPED_TRACE(scene.name);
     const State one = one_thread(scene.bed);
     expect_same_bits(one_thread(scene.bed), one);  // and twice the same
-    for (const int threads : {2, 4})
+    for (const int threads : {2, 3, 4})
       expect_same_bits(run(*make_engine(Backend::cpu, threads), scene.bed.scene, scene.bed.state, steps),
                        one);
   }

@@ -25,6 +25,8 @@ std::vector<Variant> variants() {
   smooth.scene.contact.fill(LinearContact{1e5, 0, 0, 0, 0, 0});
   for (Contact& c : smooth.state.contacts) c.spring.delta_t = {0, 0, 0};
   for (WallContact& c : smooth.state.wall_contacts) c.spring.delta_t = {0, 0, 0};
+  all.push_back({"a side wall moves in", squeezed_bed()});
+  all.push_back({"sheared along side walls", sheared_between_walls()});
   return all;
 }
 
