@@ -70,7 +70,7 @@ double water_frequency(const Skeleton& skeleton, const Water& water, const std::
     }
     lambda = along / norm2;
   }
-  return lambda + std::abs(lambda - last);
+  return std::max(0.0, lambda + std::abs(lambda - last));  // of nothing but rounding it may be below
 }
 
 }  // namespace

@@ -163,10 +163,12 @@ void check_room(const cases::Case& c, const Stage& stage, const dem::State& s) {
 void check_overlaps(const cases::Case& c, const dem::Scene& scene, const dem::State& s) {
   const Overlap o = deepest_overlap(scene, s);
   if (o.fraction <= c.guards.max_overlap) return;
+  const bool at_side_wall = o.j < 0 && scene.body(o.wall).axis < 2;
   throw error(c.start.empty() ? c.directory.string() : c.start.string(), ": grain ", s.id[o.i], " at ",
               dem::triple(s.x[o.i]), " m ", describe(o, s),
               "; expected at most guards.max_overlap = ", c.guards.max_overlap,
-              ": check radii, positions and box of the start");
+              at_side_wall ? ": let the bed settle between the walls, or leave them out (box.walls)"
+                           : ": check radii, positions and box of the start");
 }
 
 }  // namespace

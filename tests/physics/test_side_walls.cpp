@@ -195,7 +195,7 @@ TEST_P(SideWall, ThatMovesDoesWork) {
       before = std::move(now);
     }
     const State now = engine->state();
-    const double work = now.ledger.top_wall, stored = observe(s, now).energy.total();
+    const double work = now.ledger.planes, stored = observe(s, now).energy.total();
     EXPECT_NEAR(std::abs(now.at(moves).x[axis] - (high ? s.box[axis] : 0)) / u, 1, 1e-4) << name_of(moves);
     EXPECT_NEAR(work / (k * u * u / (2 * (n + 1))), 1, 1e-3) << name_of(moves);
     EXPECT_NEAR(by_hand / work, 1, 1e-9) << name_of(moves);  // places of 0.1 m, ways of 1e-9 m
