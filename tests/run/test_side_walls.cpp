@@ -65,7 +65,7 @@ TEST_F(SideWalls, RefuseABedThatSticksThroughThem) {
   run(bed("periodic", "", settle));
   expect_error(
       to_run(bed("walled", four, "start = \"../periodic\"\nstages = [\"consolidate\"]\n")),
-      {"periodic/output/checkpoint.h5", "overlaps the side wall ", "check radii, positions and box"});
+      {"periodic/output/checkpoint.h5", "overlaps the side wall ", "let the bed settle between the walls"});
 }
 
 TEST_F(SideWalls, TheirSidesAreNotOpenToGrains) {
