@@ -101,11 +101,13 @@ inline void scatter(const PairGroup& p, const Geometry<Pack>& at, const Vec3<Pac
 
 // What the law remembers of a group, and no more.
 template <class L>
-inline void recall(const PairList& list, std::int64_t group, Spring<Pack>& spring) {
+inline Spring<Pack> recalled(const PairList& list, std::int64_t group) {
+  Spring<Pack> spring;
   MoreParts::for_each_memory([&]<class Part>() {
     if constexpr (L::template remembers<Part>)
       static_cast<typename Part::template Memory<Pack>&>(spring) = list.of<Part>()[group];
   });
+  return spring;
 }
 template <class L>
 inline void remember(const Spring<Pack>& spring, PairList& list, std::int64_t group) {
@@ -129,7 +131,6 @@ template <class L, Account account, Shares shares>
   Slide<Pack> slides[group_block];
   Vec3<Pack> delta_t[group_block];
   Grip<Pack> grips[group_block];
-  Spring<Pack> springs[group_block];
 
   const auto groups = static_cast<std::int64_t>(list.pairs.size());
   for (std::int64_t start = 0; start < groups; start += group_block) {
@@ -145,16 +146,16 @@ template <class L, Account account, Shares shares>
       const PairGroup& later = list.pairs[std::min(start + g + group_block, groups - 1)];
       for (const Offset j : later.j)
         __builtin_prefetch(&rows.grain(j).x), __builtin_prefetch(&rows.grain(j).omega);
-      recall<L>(list, start + g, springs[g]);
-      if constexpr (L::rubs) delta_t[g] = carry(dt, geometry[g], slides[g], springs[g].delta_t);
-      grips[g] = grip<L>(law, geometry[g], motion[g].at_step(), delta_t[g], springs[g]);
+      const Spring<Pack> spring = recalled<L>(list, start + g);
+      if constexpr (L::rubs) delta_t[g] = carry(dt, geometry[g], slides[g], spring.delta_t);
+      grips[g] = grip<L>(law, geometry[g], motion[g].at_step(), delta_t[g], spring);
     }
     for (int g = 0; g < block; ++g) {
       const PairGroup& p = list.pairs[start + g];
       const Geometry<Pack>& at = geometry[g];
-      const Action<Pack> a =
-          act<L, account>(law, dt, at, motion[g].at_step(), delta_t[g], grips[g], springs[g]);
-      remember<L>(springs[g], list, start + g);
+      Spring<Pack> spring = recalled<L>(list, start + g);
+      const Action<Pack> a = act<L, account>(law, dt, at, motion[g].at_step(), delta_t[g], grips[g], spring);
+      remember<L>(spring, list, start + g);
       scatter<L, shares>(p, at, a.f, a.f_x_n, ledger ? a.slip : Pack(0.0), load, slot);
       if constexpr (L::damps && ledger)
         scatter<L, shares>(p, at, a.f_viscous, a.f_x_n_viscous, Pack(0.0), bed.damping.data(),
