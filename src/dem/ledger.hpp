@@ -1,12 +1,14 @@
-// The account of energy: what has passed since the stage began, J. observe.hpp has the balance with what is stored.
+// The account of energy: what has passed since the stage began, J. observe.hpp has the balance with what is
+// stored.
 #pragma once
 
 namespace moraine::dem {
 
 struct Ledger {
-  double slip = 0;           // dissipated by sliding friction (law/contact.hpp, act(); summed by chunk)
-  double viscous = 0;        // dissipated by gamma_n, gamma_t
-  double planes = 0;         // work done on the grains and the planes by what moves planes (body/motion.hpp, close())
+  double slip = 0;     // dissipated by sliding friction (law/contact.hpp, act(); summed by chunk)
+  double viscous = 0;  // dissipated by gamma_n, gamma_t
+  double planes =
+      0;  // work done on the grains and the planes by what moves planes (body/motion.hpp, close())
   double layers = 0;         // work done on the grains by the driven layers (likewise)
   double viscous_power = 0;  // W, at the present step
   double water = 0;          // work done on the grains and the top wall by pore water

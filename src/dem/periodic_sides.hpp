@@ -1,4 +1,5 @@
-// Periodic sides of the box: the nearest image of a distance. The search has the cells' own way across a side (neighbours.hpp).
+// Periodic sides of the box: the nearest image of a distance. The search has the cells' own way across a side
+// (neighbours.hpp).
 #pragma once
 #include "dem/scene.hpp"
 
