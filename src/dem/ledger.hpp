@@ -5,13 +5,12 @@
 namespace moraine::dem {
 
 struct Ledger {
-  double slip = 0;     // dissipated by sliding friction (law/contact.hpp, act(); summed by chunk)
+  double slip = 0;     // dissipated by sliding friction: law/contact.hpp, act()
   double viscous = 0;  // dissipated by gamma_n, gamma_t
-  double planes =
-      0;  // work done on the grains and the planes by what moves planes (body/motion.hpp, close())
-  double layers = 0;         // work done on the grains by the driven layers (likewise)
+  double planes = 0;   // work on the grains and the planes of what moves planes: body/motion.hpp, close()
+  double layers = 0;   // work on the grains of the driven layers: likewise
   double viscous_power = 0;  // W, at the present step
-  double water = 0;          // work done on the grains and the top wall by pore water
+  double water = 0;          // work on the grains and the top wall of pore water
 };
 
 }  // namespace moraine::dem
