@@ -1,4 +1,5 @@
-// What is refused before a step is taken, and how a grain that went wrong is reported.
+// What is refused before a step is taken (and by motion_of(): bodies that move along too many axes), and how
+// a grain that went wrong is reported.
 #pragma once
 #include <string>
 

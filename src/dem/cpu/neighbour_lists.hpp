@@ -2,6 +2,9 @@
 // few thousand steps), near pairs within a much smaller margin (every few dozen), and of these the
 // overlapping ones carry force. When a list is renewed changes no bit: pairs that do not touch add exact
 // zeros.
+//
+// When they run out: schedule.cpp, Worker::lists_last() sees it. Near pairs are then renewed along with the
+// forces; for new candidates the run ends, and pair_engine.cpp, advance() searches.
 #pragma once
 #include "dem/control.hpp"
 #include "dem/cpu/bed.hpp"
