@@ -80,9 +80,8 @@ TEST(Energy, OfGrainsAndWaterIsKept) {
   WetBed bed = sheared();
   for (dem::ContactParameters& p : bed.scene.contact) p.gamma_n = p.gamma_t = 0;
   for (const TopSide top : {TopSide::drained, TopSide::impermeable}) {
-    Water w = water_over(bed);
-    w.top = top, w.k_c = 1e-10;
-    if (top == TopSide::impermeable) w.sides = {};
+    Water w = water_under(bed, top);
+    w.k_c = 1e-10;
     w.interval = 1;
     bed.scene.dt *= 0.2;
     WetRun run(bed, w);

@@ -393,9 +393,8 @@ TEST(CoupledStability, EnergyDoesNotGrow) {
       for (dem::ContactParameters& p : s.contact) p.mu_s = p.mu_d = 100;  // sticks
       for (dem::Index i = 0; i < bed.state.size(); ++i)
         bed.state.v[i] = {1e-5 * std::sin(1e3 * i), 1e-5 * std::sin(2e3 * i), 1e-5 * std::sin(3e3 * i)};
-      Water w = water_over(bed);
-      w.compressibility = beta, w.top = top, w.k_c = 1e-20;
-      if (top == TopSide::impermeable) w.sides = {};
+      Water w = water_under(bed, top);
+      w.compressibility = beta, w.k_c = 1e-20;
       if (beta == 1e-11) s.dt *= 0.5;
       WetRun run(bed, w);
       const auto total = [&] {

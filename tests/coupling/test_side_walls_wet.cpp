@@ -41,9 +41,7 @@ TEST(SideWallsInWater, HoldAllGrainsInsideTheGrid) {
 
 TEST(SideWallsInWater, KeepWater) {
   for (const TopSide top : {TopSide::impermeable, TopSide::drained}) {
-    Water w = water_over(stirred());
-    w.top = top;
-    if (top == TopSide::impermeable) w.sides = {};
+    Water w = water_under(stirred(), top);
     WetRun run(stirred(), w);
     const double before = run.water->record(false).volume;
     for (int k = 0; k < 10; ++k) {
@@ -63,9 +61,7 @@ TEST(SideWallsInWater, KeepWater) {
 // What the grains gain the water and the walls lose: unlike periodic sides, walls bear the pressure at them.
 TEST(SideWallsInWater, KeepMomentum) {
   for (const TopSide top : {TopSide::drained, TopSide::impermeable}) {
-    Water w = water_over(stirred());
-    w.top = top;
-    if (top == TopSide::impermeable) w.sides = {};
+    Water w = water_under(stirred(), top);
     WetRun run(stirred(), w);
     run.advance(3000);
     const State s = run.engine->state();

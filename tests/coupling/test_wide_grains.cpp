@@ -183,9 +183,7 @@ WetBed sheared(bool damped = true) {
 
 TEST(WideGrains, KeepWater) {
   for (const TopSide top : {TopSide::drained, TopSide::impermeable}) {
-    Water w = water_over(sheared());
-    w.top = top;
-    if (top == TopSide::impermeable) w.sides = {};
+    Water w = water_under(sheared(), top);
     WetRun run(sheared(), w);
     const double before = run.water->record(false).volume;
     for (int k = 0; k < 5; ++k) {

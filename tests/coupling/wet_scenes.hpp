@@ -132,6 +132,14 @@ inline Water water_over(const WetBed& bed, double height = 0) {
   return w;
 }
 
+// The same under a top wall that drains, or that is tight as all other sides then are.
+inline Water water_under(const WetBed& bed, TopSide top) {
+  Water w = water_over(bed);
+  w.top = top;
+  if (top == TopSide::impermeable) w.sides = {};
+  return w;
+}
+
 // A bed in water under way.
 struct WetRun {
   Scene scene;
@@ -208,10 +216,8 @@ inline double largest_difference(const std::vector<double>& a, const std::vector
 template <class Also>
 void expect_momentum_kept(const WetBed& bed, Also&& also) {
   for (const TopSide top : {TopSide::drained, TopSide::impermeable}) {
-    Water w = water_over(bed);
-    w.top = top;
-    w.sides.high[2].value = top == TopSide::drained ? 3e3 : 0;
-    if (top == TopSide::impermeable) w.sides = {};
+    Water w = water_under(bed, top);
+    if (top == TopSide::drained) w.sides.high[2].value = 3e3;
     WetRun run(bed, w);
     run.advance(3000);
     const dem::State s = run.engine->state();

@@ -210,6 +210,17 @@ inline Bed cloud(Index count, double side, std::uint64_t seed) {
   return c;
 }
 
+// Vertical force that contacts carry through the horizontal plane at z, upwards, N.
+inline double carried(const State& s, const std::vector<ContactForce>& contacts, double z) {
+  double sum = 0;
+  for (const ContactForce& c : contacts) {
+    const double f = c.f_n.z + c.f_t.z;
+    if (s.x[c.i].z > z && s.x[c.j].z <= z) sum += f;
+    if (s.x[c.j].z > z && s.x[c.i].z <= z) sum -= f;
+  }
+  return sum;
+}
+
 // Every number of the two states, bit by bit.
 inline void expect_same_bits(const State& a, const State& b) {
   const auto same = [](const auto& p, const auto& q, const char* name) {

@@ -23,17 +23,6 @@ struct Silo {
   double janssen() const { return saturated() * (1 - std::exp(-weight / saturated())); }
 };
 
-// Vertical force that contacts carry through the plane at z, N.
-double carried(const State& s, const std::vector<ContactForce>& contacts, double z) {
-  double sum = 0;
-  for (const ContactForce& c : contacts) {
-    const double f = c.f_n.z + c.f_t.z;
-    if (s.x[c.i].z > z && s.x[c.j].z <= z) sum += f;
-    if (s.x[c.j].z > z && s.x[c.i].z <= z) sum -= f;
-  }
-  return sum;
-}
-
 void add_sample(Silo& silo, const Scene& s, const State& now, int samples) {
   const Loads loads = loads_of(s, now);
   double normal = 0, friction = 0, floor = 0;

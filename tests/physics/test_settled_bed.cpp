@@ -5,17 +5,6 @@
 namespace moraine::dem {
 namespace {
 
-// Forces through the horizontal plane at z, upwards, N.
-double carried(const State& s, const std::vector<ContactForce>& contacts, double z) {
-  double sum = 0;
-  for (const ContactForce& c : contacts) {
-    const double f = c.f_n.z + c.f_t.z;
-    if (s.x[c.i].z > z && s.x[c.j].z <= z) sum += f;
-    if (s.x[c.j].z > z && s.x[c.i].z <= z) sum -= f;
-  }
-  return sum;
-}
-
 class SettledBed : public OnEveryBackend {};
 
 TEST_P(SettledBed, StressIsWeight) {
