@@ -46,7 +46,7 @@ __global__ void for_each_kernel(std::int64_t n, const __grid_constant__ Body bod
 class CudaTeam {
  public:
   static constexpr int most_threads = 384;  // of a block
-  // Eight numbers for each thread, and two more so that rows begin at different banks of memory.
+  // Ten numbers for each thread, so that rows begin at different banks of memory.
   struct alignas(16) Slot {
     double number[10];
   };
@@ -69,7 +69,7 @@ class CudaTeam {
     __device__ bool any(bool so) const { return __any_sync(together, so); }
     template <class T, class Use>
     __device__ void in_order(const T& mine, Use&& use) const {
-      static_assert(sizeof(T) <= 8 * sizeof(double) && alignof(T) <= alignof(Slot));
+      static_assert(sizeof(T) <= sizeof(Slot) && alignof(T) <= alignof(Slot));
       *reinterpret_cast<T*>(slot + lane) = mine;
       __syncwarp(together);
       for (int k = 0; k < lanes; ++k) use(*reinterpret_cast<const T*>(slot + k));

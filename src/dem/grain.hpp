@@ -18,27 +18,12 @@ struct alignas(64) GrainRow {
   double inverse_inertia;  // 1/(kg m2); 0 for a held grain
 };
 
-// Velocities at step n, needed by viscous contacts only.
-struct alignas(32) NowRow {
-  Vec3d v;
-  double unused_v;
-  Vec3d omega;
-  double unused_omega;
-};
-
 // Sums over a grain's contacts.
 struct alignas(64) LoadRow {
   Vec3d f;
   double slip;  // J, of the contacts in which the grain is i
   Vec3d torque;
-  double unused;
-
-  MORAINE_HD void add(const Vec3d& force, const Vec3d& moment, double slipped) {
-    f += force, torque += moment, slip += slipped;
-  }
-  MORAINE_HD void add(const Vec3d& force, double lever, const Vec3d& f_x_n, double slipped) {
-    f += force, torque = axpy(lever, f_x_n, torque), slip += slipped;
-  }
+  double viscous;  // J, likewise
 };
 
 // What pore water does to a grain, N.

@@ -40,15 +40,6 @@ MORAINE_HD Mobility mobility(const Scene& scene, const GrainRow& g) {
           g.inverse_inertia};
 }
 
-// W, what the forces of viscous contacts do to a grain at step n, when its velocity is half a step further.
-// `whole`: its load with the water's.
-MORAINE_HD double damping_power(const Scene& scene, const GrainRow& g, const LoadRow& whole,
-                                const LoadRow& damping, double dt) {
-  const Mobility m = mobility(scene, g);
-  return dot(damping.f, axpy(0.5 * dt, m.acceleration(whole.f), g.v)) +
-         dot(damping.torque, axpy(0.5 * dt, m.spin_acceleration(whole.torque), g.omega));
-}
-
 template <class Row>
 struct Kinematics {
   Row x, v, omega, rotation;

@@ -16,7 +16,7 @@ constexpr Index leaf = 4;  // grains that are close enough in any order
 // As j sees it.
 void turn_round(Spring<double>& spring) {
   const auto turn = [](const char*, auto& value, const auto&) {
-    if constexpr (std::is_same_v<std::remove_reference_t<decltype(value)>, Vec3d>) value = -value;
+    if constexpr (std::is_same_v<std::remove_reference_t<decltype(value)>, Vec3d>) value = Vec3d{} - value;
   };
   MoreParts::for_each_memory([&]<class Part>() {
     typename Part::template Memory<double>& memory = spring;

@@ -16,6 +16,11 @@ GrainRow grain_at(const State& s, Index i, const std::vector<Vec3d>& v, const st
 struct Velocities {
   std::vector<Vec3d> v, omega;
 };
+BodyMotion bodies_at_step(const Scene& scene, const State& s) {
+  BodyMotion bodies = motion_of(scene, s);
+  if (s.staggered) bodies.half_step(scene, 1);
+  return bodies;
+}
 Velocities at_step(const Scene& scene, const State& s) {
   Velocities w{s.v, s.omega};
   if (!s.staggered) return w;
@@ -24,12 +29,12 @@ Velocities at_step(const Scene& scene, const State& s) {
     w.v[i] = axpy(0.5 * scene.dt, m.acceleration(kick(scene, s, i)), s.v[i]);
     w.omega[i] = axpy(0.5 * scene.dt, m.spin_acceleration(s.torque[i]), s.omega[i]);
   }
-  const BodyMotion bodies = motion_of(scene, s);
+  const BodyMotion bodies = bodies_at_step(scene, s);
   for (int k = 0; k < bodies.servos; ++k) {
     const Servo& layer = bodies.servo[k];
     if (layer.is_plane() || !layer.by_stress()) continue;
     for (Index i = 0; i < s.size(); ++i)
-      if (s.part_of[i] == layer.body) w.v[i][layer.axis] = layer.v_now;
+      if (s.part_of[i] == layer.body) w.v[i][layer.axis] = layer.v;
   }
   return w;
 }
@@ -37,14 +42,13 @@ Velocities at_step(const Scene& scene, const State& s) {
 // Springs are left as they are, here and in for_each_contact. A plane that is gone bears nothing.
 std::vector<WallForce> wall_forces(const Scene& scene, const State& s, const Velocities& at) {
   std::vector<WallForce> out;
-  const BodyMotion bodies = motion_of(scene, s);
+  const BodyMotion bodies = bodies_at_step(scene, s);
   for (const WallContact& w : s.wall_contacts) {
     const Plane* plane = bodies.find(w.wall);
     if (!plane) continue;
     const GrainRow g = grain_at(s, w.i, at.v, at.omega);
     Spring<double> spring = w.spring;
-    const PlaneAction a =
-        plane_action<GeneralLaw, Account::none>(scene, 0, *plane, g, {g.v, 0, g.omega, 0}, spring);
+    const PlaneAction a = plane_action<GeneralLaw, Account::none>(scene, 0, *plane, g, spring);
     out.push_back({w.i, w.wall, std::abs(a.f[plane->axis]), a.f, plane->gap(g.x, g.r)});
   }
   return out;
@@ -60,8 +64,7 @@ void for_each_contact(const Scene& scene, const State& s, Use&& use) {
     const Geometry<double> g = between_grains(x_ij, s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]);
     const Motion<double> motion{at.v[c.i] - at.v[c.j], at.omega[c.i], at.omega[c.j]};
     Spring<double> spring = c.spring;
-    use(c, g,
-        contact_law<GeneralLaw, Account::none>(scene.with(Material::grain), 0, g, motion, motion, spring).f);
+    use(c, g, contact_law<GeneralLaw, Account::none>(scene.with(Material::grain), 0, g, motion, spring).f);
   }
 }
 

@@ -20,8 +20,6 @@ std::vector<GrainRow> grain_rows(const Scene& scene, const State& s) {
   return rows;
 }
 
-NowRow now_row(const GrainRow& grain) { return {grain.v, 0, grain.omega, 0}; }
-
 Vec3d kick(const Scene& scene, const State& s, Index i) {
   if (s.water_force.empty()) return s.force[i];
   return with_water(scene, s.step, {s.force[i], 0, {}, 0}, s.water_force[i]).f;
@@ -33,7 +31,6 @@ void start_half_a_step_back(const Scene& scene, const Reaction& reaction, const 
   bodies.half_step(scene, -1);
   bodies.take(scene, reaction, water);  // now that velocities are those of n - 1/2
   bodies.ledger = {};
-  bodies.ledger.viscous_power = bodies.viscous_power();
 }
 
 void half_step_back(const Scene& scene, GrainRow& g, const LoadRow& whole) {
@@ -55,9 +52,11 @@ void append_grain(State& s, const GrainRow& g, const LoadRow& load, BodyId part_
 
 // What a contact remembers under this law, whatever an earlier stage has left: without friction there is no
 // spring, ...
-static Spring<double> remembered(const ContactParameters& p, Spring<double> s) {
+static Spring<double> remembered(const Scene& scene, Material material, Spring<double> s) {
+  const ContactParameters& p = scene.with(material);
   MoreParts::for_each_memory([&]<class Part>() {
-    if (!Part::keeps(p)) static_cast<typename Part::template Memory<double>&>(s) = {};
+    const bool kept = Part::keeps(p) && (scene.ledger || !std::is_same_v<Part, ViscousWork>);
+    if (!kept) static_cast<typename Part::template Memory<double>&>(s) = {};
   });
   return s;
 }
@@ -65,13 +64,13 @@ static Spring<double> remembered(const ContactParameters& p, Spring<double> s) {
 void append_contact(State& s, const Scene& scene, const Sides& sides, const GrainRow& a, const GrainRow& b,
                     Index i, Index j, const Spring<double>& spring) {
   if (!(between_grains(nearest_image(sides, a.x - b.x), a.r + b.r, a.r - b.r).delta_n < 0)) return;
-  s.contacts.push_back({i, j, remembered(scene.with(Material::grain), spring)});
+  s.contacts.push_back({i, j, remembered(scene, Material::grain, spring)});
 }
 
 void append_wall_contact(State& s, const Scene& scene, const Plane& plane, const GrainRow& g, Index i,
                          const Spring<double>& spring) {
   if (!(plane.gap(g.x, g.r) < 0)) return;
-  s.wall_contacts.push_back({i, plane.id, remembered(scene.with(plane.material), spring)});
+  s.wall_contacts.push_back({i, plane.id, remembered(scene, plane.material, spring)});
 }
 
 void finish_state(State& s, const BodyMotion& bodies) {

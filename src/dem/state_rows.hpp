@@ -11,8 +11,6 @@ namespace moraine::dem {
 
 // Rows of all grains, held ones with the velocity they are held at.
 std::vector<GrainRow> grain_rows(const Scene& scene, const State& state);
-// Velocities at step n of grains whose velocities are those of n already (a state that is not staggered).
-NowRow now_row(const GrainRow& grain);
 
 // N, the whole force that the leapfrog applies to a grain at the state's step, without gravity.
 Vec3d kick(const Scene& scene, const State& s, Index i);

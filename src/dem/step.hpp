@@ -19,7 +19,6 @@ enum class Task {
   shares,
   plane_forces,
   layer_forces,
-  damping_power,
   push,
   motion,
   sums,
@@ -32,13 +31,13 @@ enum Data : unsigned {
   grains = 1,         // positions at n, velocities at n - 1/2
   bodies = 2,         // where step n finds them
   pairs = 4,          // that may touch, with their springs
-  loads = 8,          // forces and torques on grains at n, slip
+  loads = 8,          // forces and torques on grains at n, energy dissipated
   shares = 16,        // the part of them that another chunk's pairs make
-  body_forces = 32,   // what grains do to bodies, and what viscous contacts take
+  body_forces = 32,   // what grains do to bodies
   pressure = 64,      // of the pore water at n
   impulse = 128,      // of it on grains
   next_grains = 256,  // at n + 1
-  totals = 512,       // sums over the bed, by chunk: body forces, slip, the largest speed
+  totals = 512,       // sums over the bed, by chunk: body forces, energy dissipated, the largest speed
   next_bodies = 1024  // also the ledger at n, and whether lists last for another step
 };
 }  // namespace step
@@ -58,7 +57,6 @@ inline bool always(const Scene&) { return true; }
 inline bool with_water(const Scene& s) { return uses_of(s).water; }
 inline bool with_planes(const Scene& s) { return s.has_planes(); }
 inline bool with_layers(const Scene& s) { return s.has(BodyId::top_layer); }
-inline bool with_damping_ledger(const Scene& s) { return uses_of(s).damping_ledger(); }
 
 // clang-format off
 inline constexpr TaskRow tasks[] = {
@@ -69,7 +67,6 @@ inline constexpr TaskRow tasks[] = {
     {Task::shares,        "shares",        chunk, loads | shares,           loads,               always},
     {Task::plane_forces,  "plane forces",  chunk, grains | bodies | loads,  loads | body_forces, with_planes},
     {Task::layer_forces,  "layer forces",  chunk, loads,                    body_forces,         with_layers},
-    {Task::damping_power, "damping power", chunk, grains | loads,           body_forces,         with_damping_ledger},
     {Task::push,          "push",          chunk, grains | pressure,        impulse,             with_water},
     {Task::motion,        "motion",        chunk, grains | loads,           next_grains,         always},
     {Task::sums,          "sums",          bed,   loads | next_grains,      totals,              always},

@@ -12,11 +12,9 @@ struct Uses {
   bool friction = false;   // tangential springs and torques, between grains or at planes
   bool softening = false;  // mu_d < mu_s
   bool damped_grains = false;
-  bool damped = false;  // between grains or at planes: velocities at step n are needed
+  bool damped = false;  // between grains or at planes
   bool ledger = false;
   bool water = false;
-
-  bool damping_ledger() const { return damped && ledger; }  // what viscous contacts take is worked out
 };
 
 // What its parameters ask for.

@@ -18,7 +18,7 @@ inline constexpr bool hdf5::all_doubles<Row> = true;
 namespace {
 
 constexpr const char* kind = "checkpoint";
-constexpr std::int64_t format = 6;  // raise it with every change to a struct below
+constexpr std::int64_t format = 7;  // raise it with every change to a struct below
 
 // Every member of every stored struct, once, for writing and for reading. A new member is one more line; one
 // that is forgotten does not compile.
@@ -82,11 +82,8 @@ constexpr std::tuple members<dem::WallContact>{
 
 template <>
 constexpr std::tuple members<dem::Ledger>{
-    Member{"slip", &dem::Ledger::slip},
-    Member{"viscous", &dem::Ledger::viscous},
-    Member{"planes", &dem::Ledger::planes},
-    Member{"layers", &dem::Ledger::layers},
-    Member{"viscous_power", &dem::Ledger::viscous_power},
+    Member{"slip", &dem::Ledger::slip},     Member{"viscous", &dem::Ledger::viscous},
+    Member{"planes", &dem::Ledger::planes}, Member{"layers", &dem::Ledger::layers},
     Member{"water", &dem::Ledger::water},
 };
 

@@ -43,14 +43,7 @@ TEST(Step, WhatAnEmptySpaceDoesNotUseIsNotInItsList) {
 
 TEST(Step, EachFeatureBringsItsTask) {
   const Scene bed = settled_bed().scene;
-  Scene dry = bed;
-  for (ContactParameters& p : dry.contact) p.gamma_n = p.gamma_t = 0;
-  EXPECT_TRUE(has(dry, Task::plane_forces));
-  EXPECT_FALSE(has(dry, Task::damping_power));
-  EXPECT_TRUE(has(bed, Task::damping_power));
-  Scene no_ledger = bed;
-  no_ledger.ledger = false;
-  EXPECT_FALSE(has(no_ledger, Task::damping_power));
+  EXPECT_TRUE(has(bed, Task::plane_forces));
   EXPECT_FALSE(has(bed, Task::layer_forces));
   EXPECT_TRUE(has(sheared_bed().scene, Task::layer_forces));
   Scene wet = bed;

@@ -75,15 +75,6 @@ TEST(Uses, OfWallsCountOnlyWhereThereAreWalls) {
   EXPECT_FALSE(uses_of(s).damped);
 }
 
-TEST(Uses, AnAccountOfDampingTakesDampingAndALedger) {
-  Scene s = with({1e7, 1e7, 5, 0, 0.5, 0.5});
-  EXPECT_TRUE(uses_of(s).damping_ledger());
-  s.ledger = false;
-  EXPECT_FALSE(uses_of(s).damping_ledger());
-  s.ledger = true, s.with(Material::grain).gamma_n = 0;
-  EXPECT_FALSE(uses_of(s).damping_ledger());
-}
-
 // The laws that a scene takes.
 struct Taken {
   bool rubs, softens, damps, damps_at_planes, account;

@@ -44,13 +44,15 @@ inline dem::State random_state(RandomNumbers& number, dem::Index n) {
       list->push_back(number.vector());
     }
     s.part_of.push_back(static_cast<dem::BodyId>(k % 3));
-    if (k > 0) s.contacts.push_back({k - 1, k, number.vector(), static_cast<double>(k % 2)});
-    s.wall_contacts.push_back({k, dem::BodyId::floor, number.vector(), 1});
+    if (k > 0)
+      s.contacts.push_back(
+          {k - 1, k, {number.vector(), static_cast<double>(k % 2), number.vector(), number.vector()}});
+    s.wall_contacts.push_back(
+        {k, dem::BodyId::floor, {number.vector(), 1, number.vector(), number.vector()}});
   }
-  if (n > 0) s.wall_contacts.push_back({0, dem::BodyId::top_wall, number.vector(), 0});
+  if (n > 0) s.wall_contacts.push_back({0, dem::BodyId::top_wall, {number.vector(), 0, {}, {}}});
   for (dem::BodyState& body : s.bodies) body = {number.vector(), number.vector(), number.vector()};
-  for (double* value :
-       {&s.ledger.slip, &s.ledger.viscous, &s.ledger.planes, &s.ledger.layers, &s.ledger.viscous_power}) {
+  for (double* value : {&s.ledger.slip, &s.ledger.viscous, &s.ledger.planes, &s.ledger.layers}) {
     *value = number();
   }
   s.step = (std::int64_t{1} << 53) + 1;

@@ -27,7 +27,8 @@ struct Bed {
     s.v = {{3, 0, 0}, {1, 0, 0}, {2, 0, 0}};
     s.omega = s.rotation = s.force = s.torque = std::vector<Vec3d>(3, Vec3d{0, 0, 0});
     s.part_of = {dem::BodyId::top_layer, dem::BodyId::bottom_layer, dem::BodyId::none};
-    s.contacts = {{0, 1, {}}, {0, 2, {}}, {1, 2, {{0, 1e-9, 0}, 0}}};
+    s.contacts = {{0, 1, {}}, {0, 2, {}}, {1, 2, {}}};
+    s.contacts[2].spring.delta_t.y = 1e-9;
     s.step = 40;
   }
 };

@@ -236,15 +236,17 @@ inline void expect_same_bits(const State& a, const State& b) {
   same(a.x_start, b.x_start, "x_start");
   same(a.contacts, b.contacts, "contacts");
   const auto members = [](const std::vector<WallContact>& contacts) {  // without what lies between them
-    std::vector<std::array<double, 6>> out;
-    for (const auto& [i, wall, s] : contacts)
-      out.push_back({double(i), double(wall), s.delta_t.x, s.delta_t.y, s.delta_t.z, s.slipping});
+    std::vector<std::array<double, 12>> out;
+    for (const auto& [i, wall, s] : contacts) {
+      const Vec3d &d = s.delta_t, &v = s.v_before, &f = s.f_viscous;
+      out.push_back({double(i), double(wall), d.x, d.y, d.z, s.slipping, v.x, v.y, v.z, f.x, f.y, f.z});
+    }
     return out;
   };
   same(members(a.wall_contacts), members(b.wall_contacts), "wall_contacts");
   const auto numbers = [](const State& s) {
     const Ledger& l = s.ledger;
-    return std::vector<double>{l.slip, l.viscous, l.planes, l.layers, l.viscous_power};
+    return std::vector<double>{l.slip, l.viscous, l.planes, l.layers};
   };
   same(a.bodies, b.bodies, "bodies"), same(numbers(a), numbers(b), "ledger");
   EXPECT_EQ(a.step, b.step);

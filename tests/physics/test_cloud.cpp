@@ -35,9 +35,9 @@ TEST_P(Cloud, ContactsAndForcesOfAllPairs) {
           const auto g = between_grains(x, now.r[i] + now.r[j], now.r[i] - now.r[j]);
           const State& at = bed.state;
           const Motion<double> motion{at.v[i] - at.v[j], at.omega[i], at.omega[j]};
-          Spring<double> spring{{0, 0, 0}, 0};
+          Spring<double> spring;
           const auto a = contact_law<Linear<Coulomb, Viscosity>, Account::energy>(s.with(Material::grain), 0,
-                                                                                  g, motion, motion, spring);
+                                                                                  g, motion, spring);
           force[i] += a.f, force[j] -= a.f;
           largest = std::max(largest, length(a.f));
         }

@@ -138,7 +138,8 @@ Incline roll_down(double theta, double mu, double l_expected) {
   const Triple dt(Vec3d{s.dt, s.dt, s.dt});
   const Plane floor{.id = BodyId::floor};
   GrainRow grain{{0, 0, R - normal / s.with(Material::wall).k_n}, R, {0, 0, 0}, R, {0, 0, 0}, 0};
-  Spring<double> spring{{hold / s.with(Material::wall).k_t, 0, 0}, 0};
+  Spring<double> spring;
+  spring.delta_t.x = hold / s.with(Material::wall).k_t;
   Vec3d f{-hold, 0, normal}, torque{0, l_expected * hold, 0}, rotation{0, 0, 0};
   const int steps = 5000;
   for (int step = 0; step < steps; ++step) {
@@ -147,7 +148,7 @@ Incline roll_down(double theta, double mu, double l_expected) {
     leapfrog(kinematics, a, Triple(mobility_of.spin_acceleration(torque)), dt);
     grain.x = kinematics.x, grain.v = kinematics.v, grain.omega = kinematics.omega;
     const auto action =
-        plane_action<Linear<Coulomb, Undamped>, Account::energy>(s, s.dt, floor, grain, NowRow{}, spring);
+        plane_action<Linear<Coulomb, Undamped>, Account::energy>(s, s.dt, floor, grain, spring);
     f = action.f, torque = action.torque;
   }
   const double time = steps * s.dt;

@@ -159,7 +159,8 @@ TEST(RotatedPair, ForcesTurnWithIt) {
 
   for (const double spring : {0.0, strained}) {
     const Vec3d first = spring / std::sqrt(2.0) * (t + b);
-    Spring<Pack> s{lanes([&](int) { return first; }), 0.0};
+    Spring<Pack> s;
+    s.delta_t = lanes([&](int) { return first; });
     Action<Pack> a{};
     Pack slip = 0.0;
     for (std::int64_t step = 1; step <= steps; ++step) {
@@ -169,7 +170,7 @@ TEST(RotatedPair, ForcesTurnWithIt) {
       const Vec3p v =
           Pack(2 * std::sin(0.5 * theta) / dt * distance) * cross(axis, turned(angle - 0.5 * theta));
       const Motion<Pack> motion{v, omega, omega};
-      a = contact_law<Linear<Coulomb, Undamped>, Account::energy>(law, dt, g, motion, motion, s);
+      a = contact_law<Linear<Coulomb, Undamped>, Account::energy>(law, dt, g, motion, s);
       slip += a.slip;
     }
     const double end = static_cast<double>(steps) * theta, scale = k * strained;

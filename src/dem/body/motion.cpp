@@ -66,7 +66,7 @@ BodyMotion motion_of(const Scene& scene, const State& s) {
   for (const BodyId id : planes) {
     const Body& b = scene.body(id);
     if (!b.is_there()) continue;
-    m.plane[m.planes] = {id, b.material, b.axis, b.facing, place_of(scene, s, id), {0, 0, 0}, {0, 0, 0}};
+    m.plane[m.planes] = {id, b.material, b.axis, b.facing, place_of(scene, s, id), {0, 0, 0}};
     add_servos(id, m.planes++);
   }
   for (const BodyId id : {BodyId::bottom_layer, BodyId::top_layer})
@@ -77,7 +77,6 @@ BodyMotion motion_of(const Scene& scene, const State& s) {
   Reaction reaction;
   for (int k = 0; k < m.servos; ++k) reaction.force[k] = s.at(m.servo[k].body).force[m.servo[k].axis];
   m.take(scene, reaction, s.water);
-  for (int k = 0; k < m.servos; ++k) m.servo[k].v_ahead = s.staggered ? m.servo[k].v_now : m.servo[k].v;
   m.tell_planes();
   return m;
 }

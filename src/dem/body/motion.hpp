@@ -1,4 +1,4 @@
-// How bodies move, and the account of the energy they give and the contacts take. Each axis along which a
+// How bodies move, and the account of the energy they give. Each axis along which a
 // body moves or is driven has a servo: given a velocity, or the acceleration that a stress, the grains and
 // the water give its mass. One small struct of numbers; every thread advances a copy of its own and all stay
 // equal.
@@ -12,10 +12,7 @@ constexpr int most_servos = 4, most_planes = 6;
 
 // What grains do to bodies at one step: sums over grains, each in a fixed order (sums.hpp).
 struct Reaction {
-  double force[most_servos] = {};    // N, on each servo's body along its axis
-  double damping[most_servos] = {};  // N, the viscous part of it
-  // W, of viscous forces on grains, at the velocities of the step (a layer's: n - 1/2).
-  double damping_power = 0;
+  double force[most_servos] = {};  // N, on each servo's body along its axis
 };
 
 // A plane where a step finds it.
@@ -26,7 +23,6 @@ struct Plane {
   double facing = 1;
   double place = 0;  // m, along the axis
   Vec3d v{};         // m/s, at n - 1/2
-  Vec3d v_ahead{};   // m/s, at n, as foreseen before the forces there are known (viscous contacts)
 
   MORAINE_HD double gap(const Vec3d& x, double r) const { return gap_to_plane(x[axis], r, place, facing); }
   MORAINE_HD Geometry<double> geometry(const Vec3d& x, double r) const {
@@ -42,10 +38,9 @@ struct Servo {
   Drive drive;
   double facing = 1;                     // sign of a stress along the axis
   double mass = 0;                       // kg
-  double v = 0, v_now = 0, v_ahead = 0;  // m/s: at n - 1/2, at n, at n as foreseen (Plane)
+  double v = 0;                          // m/s, at n - 1/2
   double dx = 0;                         // m, of the last step
   double force = 0, force_before = 0;    // N, of the grains, now and one step earlier
-  double damping = 0;                    // N, the viscous part of it
   double water = 0, water_before = 0;    // N; zero where the bed is dry
   double stress = 0, stress_before = 0;  // Pa, asked for
 
@@ -65,8 +60,7 @@ struct BodyMotion {
   Plane plane[most_planes];
   Servo servo[most_servos];
   std::int32_t planes = 0, servos = 0;
-  double damping_power = 0;  // W, see Reaction
-  WaterReaction water;       // at the present step
+  WaterReaction water;  // at the present step
   Ledger ledger;
   std::int64_t step = 0;
 
@@ -81,28 +75,14 @@ struct BodyMotion {
                         : -b.work(0.5 * ((b.force_before + b.force) + (b.water_before + b.water)), s.dt);
       (b.is_plane() ? ledger.planes : ledger.layers) += by_drive;
     }
-    const double power = viscous_power();
-    ledger.viscous += 0.5 * (ledger.viscous_power + power) * s.dt;
-    ledger.viscous_power = power;
     ledger.water += by_water.work;
   }
-  // W, that viscous contacts take.
-  MORAINE_HD double viscous_power() const {
-    double power = -damping_power;
-    for (int k = 0; k < servos; ++k) {
-      const Servo& b = servo[k];
-      power = power - b.damping * (b.is_plane() ? b.v_now : b.v_now - b.v);
-    }
-    return power;
-  }
   MORAINE_HD void take(const Scene& s, const Reaction& reaction, const WaterReaction& by_water) {
-    damping_power = reaction.damping_power;
     water = by_water;
     for (int k = 0; k < servos; ++k) {
       Servo& b = servo[k];
-      b.force = reaction.force[k], b.damping = reaction.damping[k], b.water = of(by_water, b);
+      b.force = reaction.force[k], b.water = of(by_water, b);
       b.stress = b.by_stress() ? b.drive.stress(s.time(step)) : 0;
-      b.v_now = fma(b.acceleration(s.area()), 0.5 * s.dt, b.v);
     }
   }
 
@@ -111,9 +91,7 @@ struct BodyMotion {
     for (int k = 0; k < servos; ++k) {
       Servo& b = servo[k];
       b.force_before = b.force, b.water_before = b.water, b.stress_before = b.stress;
-      const double acceleration = b.acceleration(s.area());
-      b.v = fma(acceleration, s.dt, b.v);
-      b.v_ahead = fma(acceleration, 0.5 * s.dt, b.v);
+      b.v = fma(b.acceleration(s.area()), s.dt, b.v);
       b.dx = b.v * s.dt;
       if (b.is_plane() && plane[b.plane].axis == b.axis) plane[b.plane].place += b.dx;
     }
@@ -134,10 +112,7 @@ struct BodyMotion {
   }
   MORAINE_HD void tell_planes() {
     for (int k = 0; k < servos; ++k)
-      if (servo[k].is_plane()) {
-        Plane& p = plane[servo[k].plane];
-        p.v[servo[k].axis] = servo[k].v, p.v_ahead[servo[k].axis] = servo[k].v_ahead;
-      }
+      if (servo[k].is_plane()) plane[servo[k].plane].v[servo[k].axis] = servo[k].v;
   }
   // Pore water acts on the top wall along z and on the top layer along x.
   MORAINE_HD static double of(const WaterReaction& w, const Servo& b) {

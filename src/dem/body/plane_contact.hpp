@@ -7,20 +7,17 @@
 namespace moraine::dem {
 
 struct PlaneAction {
-  Vec3d f, torque;                  // N, N m, on the grain
-  double slip;                      // J
-  Vec3d f_viscous, torque_viscous;  // the part of both that damping contributes
+  Vec3d f, torque;       // N, N m, on the grain
+  double slip, viscous;  // J
 };
 
 template <class L, Account account>
 MORAINE_HD PlaneAction plane_action(const Scene& scene, double dt, const Plane& plane, const GrainRow& grain,
-                                    const NowRow& now, Spring<double>& spring) {
+                                    Spring<double>& spring) {
   const Geometry<double> g = plane.geometry(grain.x, grain.r);
-  const Vec3d still{0, 0, 0};
-  const Action<double> a =
-      contact_law<L, account>(scene.with(plane.material), dt, g, {grain.v - plane.v, grain.omega, still},
-                              {now.v - plane.v_ahead, now.omega, still}, spring);
-  return {a.f, g.l_i * a.f_x_n, a.slip, a.f_viscous, g.l_i * a.f_x_n_viscous};
+  const Action<double> a = contact_law<L, account>(scene.with(plane.material), dt, g,
+                                                   {grain.v - plane.v, grain.omega, {0, 0, 0}}, spring);
+  return {a.f, g.l_i * a.f_x_n, a.slip, a.viscous};
 }
 
 // A grain that is held in all directions is not tested against planes, nor against its like (Neighbours).

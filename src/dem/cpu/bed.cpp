@@ -58,9 +58,6 @@ void Bed::load_state(const Scene& s, const State& state, const BodyMotion& bodie
 
   part_of.set(state.part_of);
   grain.resize(n + 1), load.resize(n);
-  now.resize(uses.damped ? n + 1 : 0);
-  damping.resize(uses.damping_ledger() ? n : 0);
-  clear(damping);
   water.resize(uses.water ? n : 0);
   const std::vector<GrainRow> rows = grain_rows(s, state);
   std::copy(rows.begin(), rows.end(), grain.data());
@@ -70,7 +67,6 @@ void Bed::load_state(const Scene& s, const State& state, const BodyMotion& bodie
   // One grain that never touches, for the last lanes of a list; at no round place, lest a grain be there.
   grain.data()[n] = {
       {-987654321.12, -876543210.98, -765432109.87}, -1e9, {0, 0, 0}, -1e9, {0, 0, 0}, 0, {0, 0, 0}, 0};
-  if (uses.damped) now.data()[n] = {};
 
   chunks = chunks_of(*this, state, bodies);
   place_contacts(chunks, state.contacts);
@@ -82,24 +78,24 @@ Reaction sum_reactions(const Bed& bed, const BodyMotion& bodies) {
     return sum_over_chunks(bed.chunks, [&](const Chunk& c) { return number(c.at(bodies.step).reaction); });
   };
   Reaction total;
-  for (int k = 0; k < bodies.servos; ++k) {
-    total.force[k] = sum([k](const Reaction& r) { return r.force[k]; });
-    if (bed.uses.damping_ledger()) total.damping[k] = sum([k](const Reaction& r) { return r.damping[k]; });
-  }
-  if (bed.uses.damping_ledger()) total.damping_power = sum([](const Reaction& r) { return r.damping_power; });
+  for (int k = 0; k < bodies.servos; ++k) total.force[k] = sum([k](const Reaction& r) { return r.force[k]; });
   return total;
 }
 
-double sum_slip(const Bed& bed, std::int64_t step) {
-  return sum_over_chunks(bed.chunks, [step](const Chunk& c) { return c.at(step).slip; });
+Dissipation sum_dissipation(const Bed& bed, std::int64_t step) {
+  return {sum_over_chunks(bed.chunks, [step](const Chunk& c) { return c.at(step).lost.slip; }),
+          sum_over_chunks(bed.chunks, [step](const Chunk& c) { return c.at(step).lost.viscous; })};
 }
 
-double pending_slip(const Bed& bed) {
-  return sum_over_chunks(bed.chunks, [&](const Chunk& c) {
-    ChunkSum slip;
-    for (Index i = c.begin; i < c.end; ++i) slip.add(i, bed.load.data()[i].slip);
-    return slip.total();
-  });
+Dissipation pending_dissipation(const Bed& bed) {
+  const auto sum = [&](double LoadRow::*joule) {
+    return sum_over_chunks(bed.chunks, [&](const Chunk& c) {
+      ChunkSum total;
+      for (Index i = c.begin; i < c.end; ++i) total.add(i, bed.load.data()[i].*joule);
+      return total.total();
+    });
+  };
+  return {sum(&LoadRow::slip), sum(&LoadRow::viscous)};
 }
 
 double fastest(const Bed& bed, const BodyMotion& bodies) {

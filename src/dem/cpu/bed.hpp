@@ -52,7 +52,7 @@ struct alignas(64) Chunk {
   // already while another still reads.
   struct alignas(64) Tally {
     Reaction reaction;
-    double slip = 0;                 // J, dissipated in the step
+    Dissipation lost;                // in the step
     double fastest2[3] = {0, 0, 0};  // largest v^2 by component
   } tally[2];
   const Tally& at(std::int64_t step) const { return tally[step & 1]; }
@@ -70,12 +70,10 @@ struct Bed {
   std::vector<Link> links;
   Host::Array<BodyId> part_of;
   Host::Array<GrainRow> grain;  // n grains, then one that never touches
-  Host::Array<NowRow> now;      // viscous only
   Host::Array<LoadRow> load;    // of the last step of advance()
   Host::Array<LoadRow> slot;    // the first one is for lanes without a pair
   Host::Array<Index> slot_owner;
-  Host::Array<LoadRow> damping, damping_slot;  // the viscous part of them, where the ledger asks for it
-  Host::Array<WaterRow> water;                 // with pore water only: at the last exchange, for state()
+  Host::Array<WaterRow> water;  // with pore water only: at the last exchange, for state()
 
   // Grains and springs of a state; neither lists nor links.
   void load_state(const Scene& s, const State& state, const BodyMotion& bodies);
@@ -83,10 +81,10 @@ struct Bed {
 
 // Sums over the bed.
 Reaction sum_reactions(const Bed& bed, const BodyMotion& bodies);
-double sum_slip(const Bed& bed, std::int64_t step);  // J
+Dissipation sum_dissipation(const Bed& bed, std::int64_t step);
 // Of the present step, which the motion will add up only when it comes to it; the same sums in the same
 // order.
-double pending_slip(const Bed& bed);
+Dissipation pending_dissipation(const Bed& bed);
 // A bound on the speed of anything, m/s.
 double fastest(const Bed& bed, const BodyMotion& bodies);
 

@@ -9,7 +9,7 @@ namespace {
 
 constexpr int rows_ahead = 8;  // that it asks to write to
 
-enum class Velocities { at_half_steps, at_steps_too };  // the latter for viscous contacts
+enum class Viscous { no, yes };  // whether contacts dissipate by damping
 enum class Impulse { none, of_water };
 
 // A layer that a stress drives moves with its servo, whatever the forces on each of its grains.
@@ -20,7 +20,7 @@ void for_each_servo_grain(const Chunk& chunk, const BodyMotion& bodies, Use&& us
       for (const Index i : chunk.members[k]) use(i, bodies.servo[k]);
 }
 
-template <Velocities velocities, Impulse impulse>
+template <Viscous viscous, Impulse impulse>
 void move(Bed& bed, Chunk& chunk, const ChunkStep& at) {
   const Scene& scene = bed.scene;
   GrainRow* const grain = bed.grain.data();
@@ -28,9 +28,9 @@ void move(Bed& bed, Chunk& chunk, const ChunkStep& at) {
   for_each_servo_grain(chunk, at.bodies, [&](Index i, const Servo& s) { grain[i].v[s.axis] = s.v; });
   const Row zero(0.0), dt(scene.dt, scene.dt, scene.dt, 0);
   const Row all_three(1, 1, 1, 0), only_z(0, 0, 1, 0), gravity(0, 0, -scene.submerged_gravity(), 0);
-  [[maybe_unused]] const Row half_dt = Row(0.5) * dt;
   [[maybe_unused]] const Row steps(static_cast<double>(scene.exchange_interval));
-  Row sum_f = zero, group_f = zero, fastest2 = zero;
+  // The fourth numbers of these are energies.
+  Row sum_f = zero, group_f = zero, sum_torque = zero, group_torque = zero, fastest2 = zero;
   for (Index i = chunk.begin; i < chunk.end; ++i) {
     // Other threads have read these rows; asking for several at once to write to saves most of the waiting.
     __builtin_prefetch(&grain[i + rows_ahead].x, 1), __builtin_prefetch(&grain[i + rows_ahead].omega, 1);
@@ -46,20 +46,17 @@ void move(Bed& bed, Chunk& chunk, const ChunkStep& at) {
     Kinematics<Row> k{row(g.x), row(g.v), row(g.omega), row(g.rotation)};
     leapfrog(k, acceleration, spin_acceleration, dt);
     set_row(g.x, k.x), set_row(g.v, k.v), set_row(g.omega, k.omega), set_row(g.rotation, k.rotation);
-    if constexpr (velocities == Velocities::at_steps_too) {
-      set_row(bed.now.data()[i].v, fma(half_dt, acceleration, k.v));
-      set_row(bed.now.data()[i].omega, fma(half_dt, spin_acceleration, k.omega));
-    }
     group_f += f;
     if (ends_group(i)) sum_f += group_f, group_f = zero;
+    if constexpr (viscous == Viscous::yes) {
+      group_torque += torque;
+      if (ends_group(i)) sum_torque += group_torque, group_torque = zero;
+    }
     fastest2 = max(k.v * k.v, fastest2);
     set_row(loads[i].f, zero), set_row(loads[i].torque, zero);
   }
-  if constexpr (velocities == Velocities::at_steps_too)
-    for_each_servo_grain(chunk, at.bodies,
-                         [&](Index i, const Servo& s) { bed.now.data()[i].v[s.axis] = s.v_ahead; });
   Chunk::Tally& tally = chunk.at(at.step);
-  tally.slip = (sum_f + group_f)[3];
+  tally.lost = {(sum_f + group_f)[3], (sum_torque + group_torque)[3]};
   for (int a = 0; a < 3; ++a) tally.fastest2[a] = fastest2[a];
 }
 
@@ -67,11 +64,9 @@ void move(Bed& bed, Chunk& chunk, const ChunkStep& at) {
 
 ChunkTask motion_for(const Scene& scene) {
   const Uses u = uses_of(scene);
-  if (u.damped)
-    return u.water ? move<Velocities::at_steps_too, Impulse::of_water>
-                   : move<Velocities::at_steps_too, Impulse::none>;
-  return u.water ? move<Velocities::at_half_steps, Impulse::of_water>
-                 : move<Velocities::at_half_steps, Impulse::none>;
+  if (u.damped && u.ledger)
+    return u.water ? move<Viscous::yes, Impulse::of_water> : move<Viscous::yes, Impulse::none>;
+  return u.water ? move<Viscous::no, Impulse::of_water> : move<Viscous::no, Impulse::none>;
 }
 
 }  // namespace moraine::dem::cpu

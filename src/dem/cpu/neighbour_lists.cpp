@@ -39,10 +39,6 @@ void lay_out_slots(Bed& bed) {
                 " pairs across chunks; there is room for 67 million of each");
   bed.slot.resize(slots), bed.slot_owner.resize(slots);
   clear(bed.slot);
-  if (bed.uses.damping_ledger()) {
-    bed.damping_slot.resize(slots);
-    clear(bed.damping_slot);
-  }
 }
 
 void renew_pairs(Bed& bed, Chunk& chunk, int part, double near_margin) {

@@ -68,8 +68,6 @@ void PairEngine::load(const Scene& scene, const State& s, FluidCoupling* fluid) 
 // First forces, and velocities half a step back.
 void PairEngine::start(const Scene& scene) {
   BodyMotion& bodies = control_.bodies;
-  if (bed_.uses.damped)
-    for (Index i = 0; i < bed_.n; ++i) bed_.now.data()[i] = now_row(bed_.grain.data()[i]);
   schedule_->evaluate(tasks_, bodies, 0.0);
   const Reaction reaction = sum_reactions(bed_, bodies);
   if (bed_.uses.water) exchange_->alone(bed_, bodies), control_.water = exchange_->reaction();
@@ -79,7 +77,7 @@ void PairEngine::start(const Scene& scene) {
     const LoadRow whole =
         bed_.uses.water ? with_water(scene, bodies.step, load, bed_.water.data()[i].f) : load;
     half_step_back(scene, bed_.grain.data()[i], whole);
-    load.slip = 0;
+    load.slip = load.viscous = 0;
   }
 }
 
@@ -110,7 +108,7 @@ State PairEngine::state() const {
   if (!control_.closed) {
     bodies.close(bed_.scene, sum_reactions(bed_, bodies),
                  reaction_at(bed_.scene, exchange_->reaction(), bodies.step));
-    bodies.ledger.slip += pending_slip(bed_);
+    bodies.ledger.add(pending_dissipation(bed_));
   }
   const GrainRow* const grain = bed_.grain.data();
   for (std::int64_t i = 0; i < bed_.water.size(); ++i) s.water_force.push_back(bed_.water.data()[i].f);

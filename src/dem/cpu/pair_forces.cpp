@@ -20,38 +20,26 @@ constexpr int block_pairs = 16;  // that go through the phases together
 enum class Shares { in_place, to_slots };
 
 // What the loop reads of a group of pairs.
-template <class L>
 struct Gathered {
   Vec3<Pack> x_ij;
   Pack r_sum, r_difference;
   Motion<Pack> before;
-  [[no_unique_address]] std::conditional_t<L::damps, Motion<Pack>, std::tuple<>> now;
-
-  const Motion<Pack>& at_step() const {  // for what only damped contacts ask
-    if constexpr (L::damps)
-      return now;
-    else
-      return before;
-  }
 };
 
 class Rows {
  public:
-  explicit Rows(const Bed& bed)
-      : grain_(reinterpret_cast<const char*>(bed.grain.data())),
-        now_(reinterpret_cast<const char*>(bed.now.data())) {}
+  explicit Rows(const Bed& bed) : grain_(reinterpret_cast<const char*>(bed.grain.data())) {}
   const GrainRow& grain(Offset at) const {
     return *reinterpret_cast<const GrainRow*>(grain_ + 2 * static_cast<std::size_t>(at));
   }
-  const NowRow& now(Offset at) const { return *reinterpret_cast<const NowRow*>(now_ + at); }
 
  private:
-  const char *grain_, *now_;
+  const char* grain_;
 };
 
 template <class L>
 inline void gather(const Rows& rows, const Line& difference, const Sides& sides, const PairGroup& p,
-                   bool across_sides, Gathered<L>& q) {
+                   bool across_sides, Gathered& q) {
   Line lines[lanes];
   Pack c[8];
   for (int k = 0; k < lanes; ++k)
@@ -66,59 +54,48 @@ inline void gather(const Rows& rows, const Line& difference, const Sides& sides,
     to_columns(lines, c);
     q.before.omega_i = {c[0], c[1], c[2]}, q.before.omega_j = {c[4], c[5], c[6]};
   }
-  if constexpr (L::damps) {
-    for (int k = 0; k < lanes; ++k)
-      lines[k] = fma(Line{Row(-1, -1, -1, 0), 0.0}, line(rows.now(p.j[k])), line(rows.now(p.i[k])));
-    to_columns(lines, c);
-    q.now.v = {c[0], c[1], c[2]}, q.now.omega_i = {c[4], c[5], c[6]};
-    for (int k = 0; k < lanes; ++k) lines[k] = line(rows.now(p.j[k]));
-    to_columns(lines, c);
-    q.now.omega_j = {c[4], c[5], c[6]};
-  }
 }
 
 // Turns what a group's pairs do to their grains back into lines and adds them up, or leaves j's share in its
 // slot.
 template <class L, Shares shares>
-inline void scatter(const PairGroup& p, const Geometry<Pack>& at, const Vec3<Pack>& f,
-                    const Vec3<Pack>& f_x_n, const Pack& slip, LoadRow* load, LoadRow* slot) {
+inline void scatter(const PairGroup& p, const Geometry<Pack>& at, const Action<Pack>& a, LoadRow* load,
+                    LoadRow* slot) {
   const auto row_at = [](LoadRow* first, Offset o) -> double* {
     return reinterpret_cast<double*>(reinterpret_cast<char*>(first) + o);
   };
   constexpr bool to_slots = shares == Shares::to_slots;
-  const Pack zero(0.0);
-  const Pack columns[8] = {f.x, f.y, f.z, slip, f_x_n.x, f_x_n.y, f_x_n.z, zero};
+  const Pack columns[8] = {a.f.x, a.f.y, a.f.z, a.slip, a.f_x_n.x, a.f_x_n.y, a.f_x_n.z, a.viscous};
   Line action[lanes];
   to_lines(columns, action);
   for (int k = 0; k < lanes; ++k) {
-    double *const a = row_at(load, p.i[k]), *const b = row_at(to_slots ? slot : load, p.target[k]);
+    double *const on_i = row_at(load, p.i[k]), *const on_j = row_at(to_slots ? slot : load, p.target[k]);
     const double l_i = L::rubs ? at.l_i[k] : 0, l_j = L::rubs ? at.l_j[k] : 0;
-    fma(Line{1.0, l_i}, action[k], Line::load(a)).store(a);
-    const Line on_j{Row(-1, -1, -1, 0), l_j};
-    (to_slots ? on_j * action[k] : fma(on_j, action[k], Line::load(b))).store(b);
+    fma(Line{1.0, Row(l_i, l_i, l_i, 1)}, action[k], Line::load(on_i)).store(on_i);
+    const Line factor{Row(-1, -1, -1, 0), Row(l_j, l_j, l_j, 0)};
+    (to_slots ? factor * action[k] : fma(factor, action[k], Line::load(on_j))).store(on_j);
   }
 }
 
 // What the law remembers of a group, and no more.
-template <class L>
+template <class L, Account account>
 inline Spring<Pack> recalled(const PairList& list, std::int64_t group) {
   Spring<Pack> spring;
   MoreParts::for_each_memory([&]<class Part>() {
-    if constexpr (L::template remembers<Part>)
+    if constexpr (L::template remembers<Part, account>)
       static_cast<typename Part::template Memory<Pack>&>(spring) = list.of<Part>()[group];
   });
   return spring;
 }
-template <class L>
+template <class L, Account account>
 inline void remember(const Spring<Pack>& spring, PairList& list, std::int64_t group) {
   MoreParts::for_each_memory([&]<class Part>() {
-    if constexpr (L::template remembers<Part>) list.of<Part>()[group] = spring;
+    if constexpr (L::template remembers<Part, account>) list.of<Part>()[group] = spring;
   });
 }
 
 template <class L, Account account, Shares shares>
 [[gnu::flatten]] void list_forces(Bed& bed, PairList& list, double dt, LoadRow* load) {
-  constexpr bool ledger = account == Account::energy;
   constexpr int group_block = block_pairs / lanes;
   const Rows rows(bed);
   const ContactParameters law = bed.scene.with(Material::grain);
@@ -126,12 +103,18 @@ template <class L, Account account, Shares shares>
   const Line difference = i_minus_j();
   LoadRow* const slot = bed.slot.data();
 
-  Gathered<L> motion[group_block];
+  Gathered motion[group_block];
   Geometry<Pack> geometry[group_block];
   Slide<Pack> slides[group_block];
-  Vec3<Pack> delta_t[group_block];
+  Vec3<Pack> delta_t[group_block], v[group_block];
   Grip<Pack> grips[group_block];
 
+  const auto v_c = [&](int g) -> const Vec3<Pack>& {
+    if constexpr (L::rubs)
+      return slides[g].v_c;
+    else
+      return motion[g].before.v;
+  };
   const auto groups = static_cast<std::int64_t>(list.pairs.size());
   for (std::int64_t start = 0; start < groups; start += group_block) {
     const int block = static_cast<int>(std::min<std::int64_t>(group_block, groups - start));
@@ -146,20 +129,18 @@ template <class L, Account account, Shares shares>
       const PairGroup& later = list.pairs[std::min(start + g + group_block, groups - 1)];
       for (const Offset j : later.j)
         __builtin_prefetch(&rows.grain(j).x), __builtin_prefetch(&rows.grain(j).omega);
-      const Spring<Pack> spring = recalled<L>(list, start + g);
+      const Spring<Pack> spring = recalled<L, account>(list, start + g);
       if constexpr (L::rubs) delta_t[g] = carry(dt, geometry[g], slides[g], spring.delta_t);
-      grips[g] = grip<L>(law, geometry[g], motion[g].at_step(), delta_t[g], spring);
+      v[g] = velocity_at_step<L>(dt, v_c(g), spring);
+      grips[g] = grip<L>(law, geometry[g], v[g], delta_t[g], spring);
     }
     for (int g = 0; g < block; ++g) {
       const PairGroup& p = list.pairs[start + g];
       const Geometry<Pack>& at = geometry[g];
-      Spring<Pack> spring = recalled<L>(list, start + g);
-      const Action<Pack> a = act<L, account>(law, dt, at, motion[g].at_step(), delta_t[g], grips[g], spring);
-      remember<L>(spring, list, start + g);
-      scatter<L, shares>(p, at, a.f, a.f_x_n, ledger ? a.slip : Pack(0.0), load, slot);
-      if constexpr (L::damps && ledger)
-        scatter<L, shares>(p, at, a.f_viscous, a.f_x_n_viscous, Pack(0.0), bed.damping.data(),
-                           bed.damping_slot.data());
+      Spring<Pack> spring = recalled<L, account>(list, start + g);
+      const Action<Pack> a = act<L, account>(law, dt, at, v_c(g), v[g], delta_t[g], grips[g], spring);
+      remember<L, account>(spring, list, start + g);
+      scatter<L, shares>(p, at, a, load, slot);
     }
   }
 }

@@ -15,7 +15,7 @@ namespace moraine::dem::cpu {
 // those. Kept instead of the index because the loop over pairs would have to compute it.
 using Offset = std::uint32_t;
 constexpr Offset row_bytes = sizeof(LoadRow);
-static_assert(sizeof(GrainRow) == 2 * row_bytes && sizeof(NowRow) == row_bytes);
+static_assert(sizeof(GrainRow) == 2 * row_bytes);
 
 constexpr int lanes = Pack::width;
 

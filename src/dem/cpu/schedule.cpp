@@ -95,7 +95,7 @@ class Worker {
     if (exchange_.has_failed(n)) return Schedule::Pause::failed;
 
     if (!layer_by_stress_) move_bodies();
-    if (!control_.closed) control_.bodies.ledger.slip += sum_slip(bed_, n);
+    if (!control_.closed) control_.bodies.ledger.add(sum_dissipation(bed_, n));
     control_.closed = false;
     if (check && std::ranges::any_of(bed_.chunks, [](const Chunk& c) { return c.lost >= 0; }))
       return Schedule::Pause::lost;
@@ -172,8 +172,8 @@ class Worker {
     ChunkStep at{control_.bodies, step(), dt(), w.load};
     for (const ChunkTask task : tasks_.after_shares) task(bed_, c, at);
     if (exchanges_now()) {
-      // To its own place where the damping's ledger or a later step may ask for it, else to a buffer.
-      const bool keep = !grains_are_ahead_ || bed_.uses.damped || bed_.scene.exchange_interval > 1;
+      // To its own place where a later step may ask for it, else to a buffer.
+      const bool keep = !grains_are_ahead_ || bed_.scene.exchange_interval > 1;
       WaterRow* const push = keep ? bed_.water.data() : buffers_.push.data() - c.begin;
       exchange_.push(bed_, c, push);
       at.push = push;
@@ -262,7 +262,7 @@ Schedule::Pause Schedule::run(const StepTasks& tasks, Exchange& exchange, Contro
 }
 
 void Schedule::evaluate(const StepTasks& tasks, const BodyMotion& bodies, double dt) {
-  clear(bed_.load), clear(bed_.damping);
+  clear(bed_.load);
   const ChunkStep at{bodies, bodies.step, dt, bed_.load.data()};
   for (Chunk& c : bed_.chunks)
     for (const ChunkTask task : tasks.at_once) task(bed_, c, at);

@@ -17,9 +17,6 @@ StepTasks tasks_for(const Scene& scene) {
       case Task::layer_forces:
         tasks.after_shares.push_back(layer_forces_for(scene));
         break;
-      case Task::damping_power:
-        tasks.after_shares.push_back(damping_power_for(scene));
-        break;
       case Task::motion:
         tasks.motion = motion_for(scene);
         break;

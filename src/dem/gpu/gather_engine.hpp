@@ -65,7 +65,7 @@ class GatherEngine final : public Engine {
     view_ = {};
     view_.scene = scene, view_.sides = Sides::of(scene);
     view_.n = n_, view_.order = {chunk_size(n_)}, view_.margin = neighbour_margin(scene, s);
-    view_.tallies = {control.bodies.servos, uses_.damping_ledger()};
+    view_.tallies = {control.bodies.servos};
     searches_ = 0;
     load_rows(s, control.bodies);
 
@@ -109,7 +109,7 @@ class GatherEngine final : public Engine {
       const Tally total = sums(bodies.step);
       bodies.close(view_.scene, view_.tallies.reaction(total),
                    reaction_at(view_.scene, control.water, bodies.step));
-      bodies.ledger.slip += total.sum[TallyLayout::slip];
+      bodies.ledger.add(TallyLayout::dissipation(total));
     }
     for (Index i = 0; i < n_; ++i) append_grain(s, grains[i], loads[i], kept_.part_of[i]);
 
@@ -140,7 +140,7 @@ class GatherEngine final : public Engine {
     for (Index i = 0; i < n_; ++i) loads[i] = {s.force[i], 0, s.torque[i], 0};
     load_.set(loads);
     for (int parity : {0, 1}) {
-      grain_[parity].resize(n_), now_[parity].resize(uses_.damped ? n_ : 0);
+      grain_[parity].resize(n_);
       tally_[parity].set(std::vector<Tally>(view_.groups())), chunk_tally_[parity].resize(view_.chunks());
     }
     grain_[s.step & 1].set(grain_rows(view_.scene, s));
@@ -158,7 +158,7 @@ class GatherEngine final : public Engine {
 
   void refresh_view() {
     for (int parity : {0, 1}) {
-      view_.grain[parity] = grain_[parity].data(), view_.now[parity] = now_[parity].data();
+      view_.grain[parity] = grain_[parity].data();
       view_.tally[parity] = tally_[parity].data(), view_.chunk_tally[parity] = chunk_tally_[parity].data();
     }
     view_.water = fluid_ ? water_.data() : nullptr;
@@ -204,11 +204,6 @@ class GatherEngine final : public Engine {
   void start(Control control) {
     Array<GrainRow>& rows = grain_[control.bodies.step & 1];
     std::vector<GrainRow> grains = rows.get();
-    if (uses_.damped) {
-      std::vector<NowRow> now(n_);
-      for (Index i = 0; i < n_; ++i) now[i] = now_row(grains[i]);
-      now_[control.bodies.step & 1].set(now);
-    }
     evaluate(control);
     if (fluid_) exchange();
     control = space_.read(control_.data());
@@ -220,7 +215,7 @@ class GatherEngine final : public Engine {
     for (Index i = 0; i < n_; ++i) {
       const LoadRow whole = fluid_ ? with_water(view_.scene, bodies.step, loads[i], water[i].f) : loads[i];
       half_step_back(view_.scene, grains[i], whole);
-      loads[i].slip = 0;
+      loads[i].slip = loads[i].viscous = 0;
     }
     rows.set(grains), load_.set(loads), control_.set({control});
   }
@@ -279,7 +274,6 @@ class GatherEngine final : public Engine {
   GatherView view_;
   Neighbours<Space> lists_, old_lists_;
   Array<GrainRow> grain_[2];
-  Array<NowRow> now_[2];
   Array<LoadRow> load_;
   Array<WaterRow> water_;
   Array<BodyId> part_of_;

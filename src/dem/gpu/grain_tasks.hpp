@@ -13,9 +13,6 @@ template <class Laws, Account account>
 struct GrainTasks {
   using Grains = typename Laws::BetweenGrains;
   using Planes = typename Laws::AtPlanes;
-  static constexpr bool ledger = account == Account::energy;
-  static constexpr bool damped = Planes::damps;  // between grains or at planes
-  static constexpr bool damping_ledger = damped && ledger, grains_damping_ledger = Grains::damps && ledger;
 
   const GatherView& w;
   const BodyMotion& bodies;
@@ -23,53 +20,44 @@ struct GrainTasks {
 
   // All lanes come here; what counts is the sums of lane 0.
   template <class Item>
-  MORAINE_TEAM void pair_forces(const Item& item, Index i, LoadRow& load, LoadRow& damping) const {
+  MORAINE_TEAM void pair_forces(const Item& item, Index i, LoadRow& load) const {
     const std::int64_t end = w.row[i + 1];
     for (std::int64_t k_0 = w.row[i]; item.any(k_0 < end); k_0 += Item::lanes) {
       const std::int64_t k = k_0 + item.lane;
-      Share share{}, viscous{};
-      if (k < end) contact(i, w.neighbour[k], w.spring[k], share, viscous);
-      item.in_order(share, [&](const Share& s) { load.add(s.f, s.lever, s.f_x_n, s.slip); });
-      if constexpr (grains_damping_ledger)
-        item.in_order(viscous, [&](const Share& s) { damping.add(s.f, s.lever, s.f_x_n, s.slip); });
+      Share share{};
+      if (k < end) share = contact(i, w.neighbour[k], w.spring[k]);
+      item.in_order(share, [&](const Share& s) {
+        load.f += s.f, load.torque = axpy(s.lever, s.f_x_n, load.torque);
+        load.slip += s.slip, load.viscous += s.viscous;
+      });
     }
   }
 
   // A plane that is further off than the margin did not touch in the step before either.
-  MORAINE_HD void plane_forces(Index i, LoadRow& load, LoadRow& damping, Tally& tally) const {
+  MORAINE_HD void plane_forces(Index i, LoadRow& load, Tally& tally) const {
     if (!meets_planes(w.scene, w.part_of[i])) return;
     const GrainRow& g = w.grain[step & 1][i];
-    const NowRow now = damped ? w.now[step & 1][i] : NowRow{};
     for (int p = 0; p < bodies.planes; ++p) {
       const Plane& plane = bodies.plane[p];
       if (!(plane.gap(g.x, g.r) < w.margin)) continue;
-      const PlaneAction a = plane_action<Planes, account>(w.scene, w.scene.dt, plane, g, now,
-                                                          w.plane_spring[bodies.planes * i + p]);
-      load.add(a.f, a.torque, a.slip);
-      if constexpr (damping_ledger) damping.add(a.f_viscous, a.torque_viscous, 0);
+      const PlaneAction a =
+          plane_action<Planes, account>(w.scene, w.scene.dt, plane, g, w.plane_spring[bodies.planes * i + p]);
+      load.f += a.f, load.torque += a.torque, load.slip += a.slip, load.viscous += a.viscous;
       for (int k = 0; k < bodies.servos; ++k) {
         const Servo& servo = bodies.servo[k];
         if (servo.plane != p) continue;
         tally.sum[w.tallies.force(k)] = -a.f[servo.axis];
-        if constexpr (damping_ledger) tally.sum[w.tallies.damping(k)] = -a.f_viscous[servo.axis];
       }
     }
   }
 
-  MORAINE_HD void layer_forces(Index i, const LoadRow& load, const LoadRow& damping, Tally& tally) const {
+  MORAINE_HD void layer_forces(Index i, const LoadRow& load, Tally& tally) const {
     if (w.part_of[i] == BodyId::none) return;
     for (int k = 0; k < bodies.servos; ++k) {
       const Servo& servo = bodies.servo[k];
       if (servo.is_plane() || servo.body != w.part_of[i]) continue;
       tally.sum[w.tallies.force(k)] = load.f[servo.axis];
-      if constexpr (damping_ledger) tally.sum[w.tallies.damping(k)] = damping.f[servo.axis];
     }
-  }
-
-  MORAINE_HD void power_of_damping(Index i, const LoadRow& load, const LoadRow& damping, Tally& tally) const {
-    if constexpr (damping_ledger)
-      tally.sum[w.tallies.damping_power()] =
-          damping_power(w.scene, w.grain[step & 1][i], pushed(i, load), damping, w.scene.dt);
   }
 
   // To step + 1; returns its speed as Tally has it.
@@ -86,12 +74,6 @@ struct GrainTasks {
     g.x = k.x, g.v = k.v, g.omega = k.omega, g.rotation = k.rotation;
     const int next = (step + 1) & 1;
     w.grain[next][i] = g;
-    if constexpr (damped) {
-      NowRow now{axpy<double>(0.5 * w.scene.dt, acceleration, g.v), 0,
-                 axpy<double>(0.5 * w.scene.dt, spin_acceleration, g.omega), 0};
-      if (servo) now.v.set(servo->axis, servo->v_ahead);
-      w.now[next][i] = now;
-    }
     return is_lost(bodies, g) ? std::numeric_limits<float>::infinity()
                               : 1.000001f * static_cast<float>(dot(g.v, g.v));
   }
@@ -101,34 +83,22 @@ struct GrainTasks {
     Vec3d f;
     double slip;
     Vec3d f_x_n;
-    double lever;
+    double lever, viscous;
   };
 
   // What the contact with j does to i.
-  MORAINE_HD void contact(Index i, Index j, Spring<double>& spring, Share& share, Share& viscous) const {
+  MORAINE_HD Share contact(Index i, Index j, Spring<double>& spring) const {
     const GrainRow* const grain = w.grain[step & 1];
     const bool first = i < j;
     const GrainRow &a = grain[first ? i : j], &b = grain[first ? j : i];
     const Geometry<double> g = between_grains(nearest_image(w.sides, a.x - b.x), a.r + b.r, a.r - b.r);
-    const Motion<double> before{a.v - b.v, a.omega, b.omega};
-    Motion<double> at = before;
-    if constexpr (Grains::damps) {
-      const NowRow* const now = w.now[step & 1];
-      const NowRow &p = now[first ? i : j], &q = now[first ? j : i];
-      at = {p.v - q.v, p.omega, q.omega};
-    }
-    const Action<double> action =
-        contact_law<Grains, account>(w.scene.with(Material::grain), w.scene.dt, g, before, at, spring);
+    const Action<double> action = contact_law<Grains, account>(w.scene.with(Material::grain), w.scene.dt, g,
+                                                               {a.v - b.v, a.omega, b.omega}, spring);
+    if (first) return {action.f, action.slip, action.f_x_n, g.l_i, action.viscous};
     // The share of a pair of an earlier chunk comes by way of a slot on the CPU, where its torque is rounded
     // by itself.
-    const bool by_slot = w.order.comes_from_earlier_chunk(i, j);
-    const auto on_i = [&](const Vec3d& f, const Vec3d& f_x_n, double slip) -> Share {
-      if (first) return {f, slip, f_x_n, g.l_i};
-      if (by_slot) return {-f, 0, g.l_j * f_x_n, 1};
-      return {-f, 0, f_x_n, g.l_j};
-    };
-    share = on_i(action.f, action.f_x_n, action.slip);
-    if constexpr (grains_damping_ledger) viscous = on_i(action.f_viscous, action.f_x_n_viscous, 0);
+    if (w.order.comes_from_earlier_chunk(i, j)) return {-action.f, 0, g.l_j * action.f_x_n, 1, 0};
+    return {-action.f, 0, action.f_x_n, g.l_j, 0};
   }
 
   MORAINE_HD LoadRow pushed(Index i, const LoadRow& load) const {

@@ -93,21 +93,19 @@ struct StepKernel {
       if (item.lane != 0) return;
       load = w.load[i];
     } else {
-      LoadRow damping{};
-      tasks.pair_forces(item, i, load, damping);
+      tasks.pair_forces(item, i, load);
       if (item.lane != 0) return;
       tally = {};
-      tasks.plane_forces(i, load, damping, tally);
-      tasks.layer_forces(i, load, damping, tally);
-      tasks.power_of_damping(i, load, damping, tally);
-      tally.sum[TallyLayout::slip] = load.slip;
+      tasks.plane_forces(i, load, tally);
+      tasks.layer_forces(i, load, tally);
+      tally.sum[TallyLayout::slip] = load.slip, tally.sum[TallyLayout::viscous] = load.viscous;
       if (part == Part::forces) w.load[i] = load;
     }
     if (part != Part::forces) tally.speed2 = tasks.motion(i, load);
   }
 
   MORAINE_HD void move_bodies(Control& c, const Tally& total) const {
-    if (!c.closed) c.bodies.ledger.slip += total.sum[TallyLayout::slip];
+    if (!c.closed) c.bodies.ledger.add(TallyLayout::dissipation(total));
     c.close_and_advance(w.scene, w.tallies.reaction(total));
     c.closed = false;
   }

@@ -6,34 +6,27 @@
 namespace moraine::dem::gpu {
 
 struct Tally {
-  static constexpr int most_sums = 2 + 2 * most_servos;
+  static constexpr int most_sums = 2 + most_servos;
   double sum[most_sums] = {};  // see TallyLayout
   float speed2 = 0;            // m2/s2, the largest, rounded up; infinite where a grain is lost
 };
 
-// Which sum is which, with so many servos; those of damping only where it has a ledger. `what` counts all
-// numbers of a tally, the speed first.
+// Which sum is which, with so many servos. `what` counts all numbers of a tally, the speed first.
 struct TallyLayout {
   std::int32_t servos = 0;
-  bool damping_ledger = false;
 
   static constexpr int speed = 0, first_sum = 1;
-  MORAINE_HD int end() const { return first_sum + (damping_ledger ? 2 + 2 * servos : 1 + servos); }
+  MORAINE_HD int end() const { return first_sum + 2 + servos; }
 
-  static constexpr int slip = 0;
-  MORAINE_HD int force(int servo) const { return 1 + servo; }
-  MORAINE_HD int damping(int servo) const { return 1 + servos + servo; }
-  MORAINE_HD int damping_power() const { return 1 + 2 * servos; }
+  static constexpr int slip = 0, viscous = 1;
+  MORAINE_HD int force(int servo) const { return 2 + servo; }
 
   MORAINE_HD Reaction reaction(const Tally& t) const {
     Reaction r;
-    for (int k = 0; k < servos; ++k) {
-      r.force[k] = t.sum[force(k)];
-      if (damping_ledger) r.damping[k] = t.sum[damping(k)];
-    }
-    if (damping_ledger) r.damping_power = t.sum[damping_power()];
+    for (int k = 0; k < servos; ++k) r.force[k] = t.sum[force(k)];
     return r;
   }
+  MORAINE_HD static Dissipation dissipation(const Tally& t) { return {t.sum[slip], t.sum[viscous]}; }
 };
 
 // One number of `to` from those of the tallies, added up in order (or on top of what it is). Many are read

@@ -14,7 +14,6 @@ struct GatherView {
   double margin;       // m
   TallyLayout tallies;
   GrainRow* grain[2];
-  NowRow* now[2];
   LoadRow* load;          // of the last step of a launch; with a layer driven by stress, of each
   const WaterRow* water;  // of the last exchange; null without pore water
   const BodyId* part_of;

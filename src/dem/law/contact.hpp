@@ -11,8 +11,7 @@
 // them are compiled together is said in laws.hpp.
 //
 // Time levels: n and delta_n belong to step n, the velocities to n - 1/2, so v_c dt is the displacement
-// between two steps (second order). Only the viscous parts need velocities at step n; they come as a second
-// Motion.
+// between two steps (second order). Only the viscous parts need a velocity at step n (viscosity.hpp).
 #pragma once
 #include <type_traits>
 
@@ -22,6 +21,9 @@
 #include "dem/law/viscosity.hpp"
 
 namespace moraine::dem {
+
+// Whether what a contact dissipates is worked out.
+enum class Account { none, energy };
 
 // A law of such parts. More: what else acts along the normal while grains touch, each with
 //   normal(p, g)        N, positive pushes apart; friction's limit does not see it
@@ -46,21 +48,19 @@ struct Law {
   template <class Part>
   static constexpr bool has = (std::is_same_v<Part, More> || ...);
   // Whether it reads and writes what this part remembers.
-  template <class Part>
+  template <class Part, Account account>
   static constexpr bool remembers = std::is_same_v<Part, Coulomb>            ? rubs
                                     : std::is_same_v<Part, SofteningCoulomb> ? softens
-                                                                             : has<Part>;
+                                    : std::is_same_v<Part, Viscosity>        ? damps
+                                    : std::is_same_v<Part, ViscousWork> ? damps&& account == Account::energy
+                                                                        : has<Part>;
 };
-
-// Whether what a contact dissipates is worked out.
-enum class Account { none, energy };
 
 template <class T>
 struct Action {
-  Vec3<T> f;                         // N, on i; j gets -f
-  Vec3<T> f_x_n;                     // N, f_t x n: times l gives the torque, on i and j alike
-  T slip;                            // J, dissipated by sliding in this step (with a ledger only)
-  Vec3<T> f_viscous, f_x_n_viscous;  // the part of both that damping contributes (with a ledger only)
+  Vec3<T> f;        // N, on i; j gets -f
+  Vec3<T> f_x_n;    // N, f_t x n: times l gives the torque, on i and j alike
+  T slip, viscous;  // J, dissipated by sliding and by damping in this step (with a ledger only)
 };
 
 // How a contact moves in a step, with normal and lever arms as they were in the middle of it: taken at its
@@ -93,19 +93,28 @@ MORAINE_HD Vec3<T> carry(double dt, const Geometry<T>& g, const Slide<T>& s, con
   return less(sum, dot(g.n, sum), s.n_mid);
 }
 
-// Normal force, N; never pulls.
+// v_c at the step, for damping; dt = 0: velocities belong to the step already.
+template <class L, class T, class Spring>
+MORAINE_HD Vec3<T> velocity_at_step(double dt, const Vec3<T>& v_c, const Spring& spring) {
+  if constexpr (L::damps)
+    return dt == 0 ? v_c : L::Damping::foreseen(v_c, spring);
+  else
+    return v_c;
+}
+
+// Normal force, N; never pulls. v: the contact's velocity at the step, m/s.
 template <class L, class P, class T>
-MORAINE_HD T normal_force(const P& p, const Geometry<T>& g, const Motion<T>& now) {
+MORAINE_HD T normal_force(const P& p, const Geometry<T>& g, const Vec3<T>& v) {
   T f_n = L::Normal::force(p, g);
-  if constexpr (L::damps) f_n = L::Damping::normal(p, g, now, f_n);
+  if constexpr (L::damps) f_n = L::Damping::normal(p, g, v, f_n);
   return select(g.delta_n < T(0), f_n, T(0));
 }
 
 // The tangential force before Coulomb's limit, N, where damping adds to the spring.
 template <class L, class P, class T>
-MORAINE_HD Vec3<T> damped_tangential(const P& p, const Geometry<T>& g, const Motion<T>& now,
+MORAINE_HD Vec3<T> damped_tangential(const P& p, const Geometry<T>& g, const Vec3<T>& v,
                                      const Vec3<T>& delta_t) {
-  return L::Damping::tangential(p, g, now, T(-p.k_t) * delta_t);
+  return L::Damping::tangential(p, g, v, T(-p.k_t) * delta_t);
 }
 
 // How firmly the contact holds: the normal force and the share of the tangential force that Coulomb's limit
@@ -116,16 +125,16 @@ struct Grip {
 };
 
 template <class L, class P, class T, class Spring>
-MORAINE_HD Grip<T> grip(const P& p, const Geometry<T>& g, const Motion<T>& now, const Vec3<T>& delta_t,
+MORAINE_HD Grip<T> grip(const P& p, const Geometry<T>& g, const Vec3<T>& v, const Vec3<T>& delta_t,
                         const Spring& spring) {
-  const T f_n = normal_force<L>(p, g, now);
+  const T f_n = normal_force<L>(p, g, v);
   if constexpr (!L::rubs) {
     return {f_n, T(0)};
   } else {
     const T limit = L::Friction::limit(p, f_n, spring);
     T size2;  // |f_t|^2
     if constexpr (L::damps) {
-      const Vec3<T> f_t = damped_tangential<L>(p, g, now, delta_t);
+      const Vec3<T> f_t = damped_tangential<L>(p, g, v, delta_t);
       size2 = dot(f_t, f_t);
     } else {
       size2 = T(p.k_t * p.k_t) * dot(delta_t, delta_t);
@@ -135,28 +144,28 @@ MORAINE_HD Grip<T> grip(const P& p, const Geometry<T>& g, const Motion<T>& now, 
 }
 
 // The forces; the spring is left at what it carries. dt = 0: no step was taken, so what slipped still slips.
+// v_c: of the step that led here, v: at its end.
 template <class L, Account account, class P, class T, class Spring>
-MORAINE_HD Action<T> act(const P& p, double dt, const Geometry<T>& g, const Motion<T>& now,
+MORAINE_HD Action<T> act(const P& p, double dt, const Geometry<T>& g, const Vec3<T>& v_c, const Vec3<T>& v,
                          const Vec3<T>& delta_t, const Grip<T>& grip, Spring& spring) {
   constexpr bool ledger = account == Account::energy;
   const T zero(0);
   const Vec3<T> none{zero, zero, zero};
-  Action<T> a{none, none, zero, none, none};
+  Action<T> a{none, none, zero, zero};
   const auto touching = g.delta_n < zero;
-  if constexpr (L::damps && ledger)
-    a.f_viscous = select(touching, L::Normal::rest(p, g, grip.f_n), zero) * g.n;
+  Vec3<T> f_viscous = none;
+  if constexpr (L::damps && ledger) f_viscous = L::Normal::rest(p, g, grip.f_n) * g.n;
   T f_n = grip.f_n;
   if constexpr (L::has_more) f_n = f_n + select(touching, L::more_normal(p, g), zero);
   if constexpr (!L::rubs) {
     a.f = f_n * g.n;
-    return a;
   } else {
     Vec3<T> f_t, kept;
     if constexpr (!L::damps) {
       kept = grip.share * delta_t;
       f_t = T(-p.k_t) * kept;
     } else {  // f_t is not the spring's alone
-      f_t = grip.share * damped_tangential<L>(p, g, now, delta_t);
+      f_t = grip.share * damped_tangential<L>(p, g, v, delta_t);
       const T carried = T(p.k_t) * sqrt(dot(delta_t, delta_t)), dynamic = T(p.mu_d) * grip.f_n;
       kept = select((grip.share < T(1)) & (carried > dynamic), dynamic / carried, T(1)) * delta_t;
       kept = select(touching, kept, none);
@@ -166,28 +175,36 @@ MORAINE_HD Action<T> act(const P& p, double dt, const Geometry<T>& g, const Moti
     if constexpr (ledger) {
       // Mean force times plastic displacement; a contact that opens gives up what its spring still held.
       a.slip = T(0.5 * p.k_t) * dot(spring.delta_t + kept, delta_t - kept);
-      if constexpr (L::damps) {
-        const Vec3<T> f_t_viscous = axpy(T(p.k_t), kept, f_t);
-        a.f_viscous += f_t_viscous;
-        a.f_x_n_viscous = cross(f_t_viscous, g.n);
-      }
+      if constexpr (L::damps) f_viscous += axpy(T(p.k_t), kept, f_t);
     }
     spring.delta_t = kept;
     if constexpr (L::softens) {
       const T slips = select((grip.share < T(1)) & touching, T(1), zero);
       spring.slipping = dt == 0 ? max(slips, spring.slipping) : slips;
     }
-    return a;
   }
+  if constexpr (L::damps) {
+    spring.v_before = dt == 0 ? none : select(touching, v_c, none);
+    if constexpr (ledger) {
+      f_viscous = select(touching, f_viscous, none);
+      a.viscous = T(-0.5 * dt) * dot(spring.f_viscous + f_viscous, v_c);
+      spring.f_viscous = f_viscous;
+    }
+  }
+  return a;
 }
 
 // The whole law. dt = 0 evaluates the forces and leaves the spring as it is.
 template <class L, Account account, class P, class T, class Spring>
 MORAINE_HD Action<T> contact_law(const P& p, double dt, const Geometry<T>& g, const Motion<T>& before,
-                                 const Motion<T>& now, Spring& spring) {
-  Vec3<T> delta_t{};
-  if constexpr (L::rubs) delta_t = carry(dt, g, slide(dt, g, before), spring.delta_t);
-  return act<L, account>(p, dt, g, now, delta_t, grip<L>(p, g, now, delta_t, spring), spring);
+                                 Spring& spring) {
+  Vec3<T> delta_t{}, v_c = before.v;
+  if constexpr (L::rubs) {
+    const Slide<T> s = slide(dt, g, before);
+    delta_t = carry(dt, g, s, spring.delta_t), v_c = s.v_c;
+  }
+  const Vec3<T> v = velocity_at_step<L>(dt, v_c, spring);
+  return act<L, account>(p, dt, g, v_c, v, delta_t, grip<L>(p, g, v, delta_t, spring), spring);
 }
 
 }  // namespace moraine::dem

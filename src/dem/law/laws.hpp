@@ -26,9 +26,14 @@ struct PartList {
   };
   // What a contact remembers, of all parts.
   template <class T>
-  struct Memory : Coulomb::Memory<T>, SofteningCoulomb::Memory<T>, Parts::template Memory<T>... {
+  struct Memory : Coulomb::Memory<T>,
+                  SofteningCoulomb::Memory<T>,
+                  Viscosity::Memory<T>,
+                  ViscousWork::Memory<T>,
+                  Parts::template Memory<T>... {
     static constexpr auto list() {
       return std::tuple_cat(Coulomb::Memory<T>::list(), SofteningCoulomb::Memory<T>::list(),
+                            Viscosity::Memory<T>::list(), ViscousWork::Memory<T>::list(),
                             Parts::template Memory<T>::list()...);
     }
   };
@@ -36,12 +41,14 @@ struct PartList {
   template <class Use>
   static constexpr void for_each_memory(Use&& use) {
     use.template operator()<Coulomb>(), use.template operator()<SofteningCoulomb>();
+    use.template operator()<Viscosity>(), use.template operator()<ViscousWork>();
     (use.template operator()<Parts>(), ...);
   }
   // A list of each part's memory.
   template <template <class> class List, class T>
-  using MemoryLists = std::tuple<List<Coulomb::Memory<T>>, List<SofteningCoulomb::Memory<T>>,
-                                 List<typename Parts::template Memory<T>>...>;
+  using MemoryLists =
+      std::tuple<List<Coulomb::Memory<T>>, List<SofteningCoulomb::Memory<T>>, List<Viscosity::Memory<T>>,
+                 List<ViscousWork::Memory<T>>, List<typename Parts::template Memory<T>>...>;
 
   using General = Law<LinearSpring, SofteningCoulomb, Viscosity, Parts...>;
   template <class L>

@@ -1,6 +1,6 @@
 // Viscous damping (Damsgaard et al. 2013, eq. 6): -gamma_n v.n along the normal, where the sum never pulls,
-// and -gamma_t v_t along the contact's plane, within Coulomb's limit. Needs the velocities at step n, which
-// are foreseen (leapfrog.hpp).
+// and -gamma_t v_t along the contact's plane, within Coulomb's limit. v is that of the contact at step n,
+// foreseen from the last two half steps, hence second order in dt: a contact remembers its velocity.
 #pragma once
 #include "dem/law/geometry.hpp"
 #include "dem/law/part.hpp"
@@ -23,20 +23,43 @@ struct Viscosity {
     }
   };
   static bool used(const Parameters& p) { return p.gamma_n > 0 || p.gamma_t > 0; }
+  static bool keeps(const Parameters& p) { return used(p); }
+
+  template <class T>
+  struct Memory {
+    Vec3<T> v_before{};  // m/s, v_c at n - 1/2; zero where it did not touch at n
+    static constexpr auto list() { return std::tuple{Named{"v_before", &Memory::v_before}}; }
+  };
+  // v_c at n + 1, from those at n + 1/2 and n - 1/2; the former alone in a contact's first step.
+  template <class T>
+  MORAINE_HD static Vec3<T> foreseen(const Vec3<T>& v_c, const Memory<T>& memory) {
+    const Vec3<T>& v = memory.v_before;
+    const auto touched = dot(v, v) > T(0);
+    return select(touched, axpy(T(0.5), v_c - v, v_c), v_c);
+  }
 
   // N, on top of an elastic normal force.
   template <class T>
-  MORAINE_HD static T normal(const Parameters& p, const Geometry<T>& g, const Motion<T>& now,
-                             const T& elastic) {
-    return max(fma(T(-p.gamma_n), dot(now.v, g.n), elastic), T(0));
+  MORAINE_HD static T normal(const Parameters& p, const Geometry<T>& g, const Vec3<T>& v, const T& elastic) {
+    return max(fma(T(-p.gamma_n), dot(v, g.n), elastic), T(0));
   }
   // N, on top of an elastic tangential force, before Coulomb's limit.
   template <class T>
-  MORAINE_HD static Vec3<T> tangential(const Parameters& p, const Geometry<T>& g, const Motion<T>& now,
+  MORAINE_HD static Vec3<T> tangential(const Parameters& p, const Geometry<T>& g, const Vec3<T>& v,
                                        const Vec3<T>& elastic) {
-    const Vec3<T> c = cross_plus(g.n, axpy(g.l_i, now.omega_i, g.l_j * now.omega_j), now.v);
-    return axpy(T(-p.gamma_t), less(c, dot(c, g.n), g.n), elastic);
+    return axpy(T(-p.gamma_t), less(v, dot(v, g.n), g.n), elastic);
   }
+};
+
+// For the account of energy: what damping does over a step is the mean of its force before and after, times
+// the contact's displacement, so a contact remembers the force.
+struct ViscousWork {
+  template <class T>
+  struct Memory {
+    Vec3<T> f_viscous{};  // N, the part of the force at n that damping contributes
+    static constexpr auto list() { return std::tuple{Named{"f_viscous", &Memory::f_viscous}}; }
+  };
+  static bool keeps(const Viscosity::Parameters& p) { return Viscosity::used(p); }
 };
 
 }  // namespace moraine::dem
