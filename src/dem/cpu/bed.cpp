@@ -18,6 +18,7 @@ std::vector<Chunk> chunks_of(const Bed& bed, const State& s, const BodyMotion& b
   for (Index c = 0; c < static_cast<Index>(chunks.size()); ++c) {
     Chunk& chunk = chunks[c];
     chunk.number = c;
+    chunk.near_margin = 1e-4 * bed.r_max;
     chunk.begin = bed.order.begin_of(c), chunk.end = std::min(bed.n, bed.order.begin_of(c + 1));
     for (int k = 0; k < bodies.servos; ++k)
       for (Index i = chunk.begin; i < chunk.end; ++i)

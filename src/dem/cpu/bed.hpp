@@ -29,6 +29,7 @@ struct PlanePair {
   Index i;
   std::int32_t plane;  // in BodyMotion
   Spring<double> spring;
+  bool touched = true;  // at the step before; true also where that is not known
 };
 
 // Slots for the pairs from one chunk to another.
@@ -42,7 +43,10 @@ struct alignas(64) Chunk {
   int owner = 0;
   std::vector<Candidate> candidates[2];  // inside the chunk, across
   PairList near[2], spare;
-  std::vector<PlanePair> planes;
+  WatchList watched[2];  // candidates that are not near
+  double near_margin;    // m, of the near pairs
+  int steps_near = 0;    // since they were drawn
+  std::vector<PlanePair> planes;  // within the neighbour margin, sorted by grain, then plane
   std::vector<Index> incoming;  // links, by the chunk they come from
   std::vector<Index> outgoing;
   std::array<std::vector<Index>, most_servos> members;  // its grains in each servo's layer

@@ -25,6 +25,9 @@ void plane_forces(Bed& bed, Chunk& chunk, const ChunkStep& at) {
   const BodyMotion& bodies = at.bodies;
   ChunkSum force[most_servos];
   for (PlanePair& p : chunk.planes) {
+    const bool touches = bodies.plane[p.plane].gap(bed.grain.data()[p.i].x, bed.grain.data()[p.i].r) < 0;
+    if (!touches && !p.touched) continue;  // one that has just opened gives up what its spring held
+    p.touched = touches;
     const PlaneAction a =
         plane_action<L, account>(bed.scene, at.dt, bodies.plane[p.plane], bed.grain.data()[p.i], p.spring);
     LoadRow& load = at.load[p.i];

@@ -11,7 +11,10 @@ namespace moraine::dem::cpu {
 
 namespace {
 
-constexpr int steps_near_list_should_last = 80;
+// How long near pairs should last: drawing them costs as much as a step or two, but a wider margin has more
+// pairs that do not touch.
+constexpr int fewest_steps = 24, most_steps = 96;
+constexpr double least_near_margin = 1e-6;  // of the largest radius
 
 // Places in the near list of the candidates there were, asked for by (i, j).
 class OldPlaces {
@@ -41,12 +44,13 @@ void lay_out_slots(Bed& bed) {
   clear(bed.slot);
 }
 
-void renew_pairs(Bed& bed, Chunk& chunk, int part, double near_margin) {
+void draw_pairs(Bed& bed, Chunk& chunk, int part) {
   const GrainRow* const grain = bed.grain.data();
   const Line difference = i_minus_j();
   PairList& old = chunk.near[part];
   PairList& list = chunk.spare;
-  list.clear();
+  WatchList& watched = chunk.watched[part];
+  list.clear(), watched.clear();
   std::vector<Candidate>& candidates = chunk.candidates[part];
   for (std::size_t start = 0; start < candidates.size(); start += lanes) {
     const int used = static_cast<int>(std::min<std::size_t>(lanes, candidates.size() - start));
@@ -58,12 +62,14 @@ void renew_pairs(Bed& bed, Chunk& chunk, int part, double near_margin) {
     }
     to_columns(lines, c);
     const Vec3<Pack> plain{c[0], c[1], c[2]}, d = nearest_image(bed.sides, plain), shift = d - plain;
-    const Pack reach = c[7] + Pack(near_margin);
+    const Pack reach = c[7] + Pack(chunk.near_margin);
     const Pack apart = dot(d, d) - reach * reach, across = dot(shift, shift);
     for (int k = 0; k < used; ++k) {
       Candidate& q = candidates[start + k];
-      if (!(apart[k] < 0)) {
+      // One that has just opened, however far, still gives up what its spring held.
+      if (!(apart[k] < 0 || (q.place != not_near && old.remembers(q.place)))) {
         q.place = not_near;
+        watched.add(q.i, q.j, across[k] > 0);
         continue;
       }
       Index target = q.j;
@@ -80,15 +86,15 @@ void renew_pairs(Bed& bed, Chunk& chunk, int part, double near_margin) {
   std::swap(old, list);
 }
 
-void renew_plane_pairs(Bed& bed, Chunk& chunk, const BodyMotion& bodies, double near_margin) {
+void find_plane_pairs(Bed& bed, Chunk& chunk, const BodyMotion& bodies) {
   std::vector<PlanePair> pairs;
-  auto known = chunk.planes.begin();  // sorted by grain, then plane
+  auto known = chunk.planes.begin();
   const auto at = [](const PlanePair& p) { return std::tie(p.i, p.plane); };
   for (Index i = chunk.begin; i < chunk.end; ++i) {
     if (!meets_planes(bed.scene, bed.part_of.data()[i])) continue;
     const GrainRow& g = bed.grain.data()[i];
     for (std::int32_t k = 0; k < bodies.planes; ++k) {
-      if (!(bodies.plane[k].gap(g.x, g.r) < near_margin)) continue;
+      if (!(bodies.plane[k].gap(g.x, g.r) < bed.margin)) continue;
       while (known != chunk.planes.end() && at(*known) < std::tie(i, k)) ++known;
       const bool same = known != chunk.planes.end() && at(*known) == std::tie(i, k);
       pairs.push_back(same ? *known : PlanePair{i, k, {}});
@@ -97,14 +103,27 @@ void renew_plane_pairs(Bed& bed, Chunk& chunk, const BodyMotion& bodies, double 
   chunk.planes = std::move(pairs);
 }
 
-}  // namespace
-
-NearMargin near_margin(const Bed& bed, double speed, double moved) {
-  const double wanted = std::max(2 * speed * bed.scene.dt * steps_near_list_should_last, 1e-5 * bed.r_max);
-  return {.margin = std::min(wanted, bed.margin - moved)};
+// Whether one of the pairs touches, or is as near as rounding.
+bool any_touches(const Bed& bed, const WatchList& watched) {
+  const Rows rows(bed.grain);
+  const Row difference(-1, -1, -1, 1), slack(1 + 1e-12);
+  Pack least(1.0);
+  for (std::size_t g = 0; g < watched.pairs.size(); ++g) {
+    const WatchList::Group& p = watched.pairs[g];
+    Row c[lanes];
+    for (int k = 0; k < lanes; ++k) c[k] = fma(difference, row(rows.grain(p.j[k])), row(rows.grain(p.i[k])));
+    transpose(c[0], c[1], c[2], c[3]);
+    Vec3<Pack> d{c[0], c[1], c[2]};
+    if (watched.across_sides[g]) d = nearest_image(bed.sides, d);
+    const Pack reach = slack * c[3];
+    least = min(fnma(reach, reach, dot(d, d)), least);
+  }
+  return bits(least < Pack(0.0)) != 0;
 }
 
-void find_candidates(const Host& space, Bed& bed, Neighbours<Host>& neighbours) {
+}  // namespace
+
+void find_candidates(const Host& space, Bed& bed, Neighbours<Host>& neighbours, const BodyMotion& bodies) {
   neighbours.build(space, bed.scene, bed.grain.data(), bed.part_of.data(), bed.n, bed.r_max, bed.margin,
                    /*half=*/true);
   std::vector<Index> link_of(bed.chunks.size(), no_link);  // from the chunk at hand to each other
@@ -131,14 +150,24 @@ void find_candidates(const Host& space, Bed& bed, Neighbours<Host>& neighbours) 
       }
     }
     for (const Index l : chunk.outgoing) link_of[bed.links[l].to] = no_link;
+    find_plane_pairs(bed, chunk, bodies);
   }
   lay_out_slots(bed);
 }
 
-void renew_near_pairs(Bed& bed, Chunk& chunk, const BodyMotion& bodies, double near_margin) {
+void draw_near_pairs(Bed& bed, Chunk& chunk) {
+  chunk.steps_near = 0;
   for (const Index l : chunk.outgoing) bed.links[l].used = 0;
-  for (int part = 0; part < 2; ++part) renew_pairs(bed, chunk, part, near_margin);
-  renew_plane_pairs(bed, chunk, bodies, near_margin);
+  for (int part = 0; part < 2; ++part) draw_pairs(bed, chunk, part);
+}
+
+void renew_near_pairs(Bed& bed, Chunk& chunk) {
+  ++chunk.steps_near;
+  if (!any_touches(bed, chunk.watched[0]) && !any_touches(bed, chunk.watched[1])) return;
+  if (chunk.steps_near < fewest_steps) chunk.near_margin = std::min(1.5 * chunk.near_margin, bed.margin);
+  if (chunk.steps_near > most_steps)
+    chunk.near_margin = std::max(0.75 * chunk.near_margin, least_near_margin * bed.r_max);
+  draw_near_pairs(bed, chunk);
 }
 
 }  // namespace moraine::dem::cpu

@@ -1,10 +1,12 @@
-// Three lists, each drawn from the one before: candidates within the neighbour margin (found by cells, every
-// few thousand steps), near pairs within a much smaller margin (every few dozen), and of these the
-// overlapping ones carry force. When a list is renewed changes no bit: pairs that do not touch add exact
-// zeros.
+// Two lists, the second drawn from the first: candidates within the neighbour margin (found by cells, every
+// few thousand steps), and of these the near pairs, whose forces are computed. All other candidates are
+// watched: each step looks whether one of them touches, which costs a tenth of computing its force, and then
+// the chunk draws its near pairs anew. So near pairs need no margin for how far grains may move, only enough
+// of one that they are not drawn at every step. When a list is renewed changes no bit: pairs that do not
+// touch add exact zeros.
 //
-// When they run out: schedule.cpp, Worker::lists_last() sees it. Near pairs are then renewed along with the
-// forces; for new candidates the run ends, and pair_engine.cpp, advance() searches.
+// When candidates run out: schedule.cpp, Worker::lists_last() sees it, the run ends, and pair_engine.cpp,
+// advance() searches.
 #pragma once
 #include "dem/control.hpp"
 #include "dem/cpu/bed.hpp"
@@ -12,22 +14,15 @@
 
 namespace moraine::dem::cpu {
 
-// How long the near lists last.
-struct NearMargin {
-  double margin = 0;  // m
-  double moved = 0;   // m, bound on the approach of any two bodies since they were made
-};
-
-// Long enough to last for some dozens of steps, never beyond what the candidates cover. speed: m/s, a bound
-// on that of anything; moved: m, since the search.
-NearMargin near_margin(const Bed& bed, double speed, double moved);
-
 // Candidates of all chunks, links between chunks and their slots. Near lists keep their springs, but have no
-// places for them until they are renewed. Throws Error if a coordinate is not finite, or if there are too
-// many pairs.
-void find_candidates(const Host& space, Bed& bed, Neighbours<Host>& neighbours);
+// places for them until they are drawn. Throws Error if a coordinate is not finite, or if there are too many
+// pairs.
+void find_candidates(const Host& space, Bed& bed, Neighbours<Host>& neighbours, const BodyMotion& bodies);
 
-// Near pairs of one chunk, between grains and with planes; springs move along.
-void renew_near_pairs(Bed& bed, Chunk& chunk, const BodyMotion& bodies, double near_margin);
+// Near pairs of one chunk; springs move along.
+void draw_near_pairs(Bed& bed, Chunk& chunk);
+
+// The same, if a pair that is only watched touches.
+void renew_near_pairs(Bed& bed, Chunk& chunk);
 
 }  // namespace moraine::dem::cpu

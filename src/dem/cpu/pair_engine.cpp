@@ -38,7 +38,6 @@ class PairEngine final : public Engine {
   Bed bed_;
   StepTasks tasks_;
   Control control_;
-  NearMargin near_;
   Neighbours<Host> neighbours_;
   std::unique_ptr<Exchange> exchange_;
   std::unique_ptr<Schedule> schedule_;
@@ -82,19 +81,18 @@ void PairEngine::start(const Scene& scene) {
 }
 
 void PairEngine::search() {
-  find_candidates(space_, bed_, neighbours_);
+  find_candidates(space_, bed_, neighbours_, control_.bodies);
   ++searches_;
   control_.moved = 0;
-  near_ = near_margin(bed_, fastest(bed_, control_.bodies), 0);
   run_team(space_.threads, [&](int t) {
     for (std::size_t c = t; c < bed_.chunks.size(); c += space_.threads)
-      renew_near_pairs(bed_, bed_.chunks[c], control_.bodies, near_.margin);
+      draw_near_pairs(bed_, bed_.chunks[c]);
   });
 }
 
 void PairEngine::advance(std::int64_t steps) {
   while (steps > 0) {
-    const Schedule::Pause pause = schedule_->run(tasks_, *exchange_, control_, near_, steps);
+    const Schedule::Pause pause = schedule_->run(tasks_, *exchange_, control_, steps);
     if (pause == Schedule::Pause::done) continue;
     check_lost(bed_, control_.bodies, kept_.id);  // of which the other pauses may come, too
     if (pause == Schedule::Pause::failed) exchange_->rethrow();

@@ -26,17 +26,6 @@ struct Gathered {
   Motion<Pack> before;
 };
 
-class Rows {
- public:
-  explicit Rows(const Bed& bed) : grain_(reinterpret_cast<const char*>(bed.grain.data())) {}
-  const GrainRow& grain(Offset at) const {
-    return *reinterpret_cast<const GrainRow*>(grain_ + 2 * static_cast<std::size_t>(at));
-  }
-
- private:
-  const char* grain_;
-};
-
 template <class L>
 inline void gather(const Rows& rows, const Line& difference, const Sides& sides, const PairGroup& p,
                    bool across_sides, Gathered& q) {
@@ -97,7 +86,7 @@ inline void remember(const Spring<Pack>& spring, PairList& list, std::int64_t gr
 template <class L, Account account, Shares shares>
 [[gnu::flatten]] void list_forces(Bed& bed, PairList& list, double dt, LoadRow* load) {
   constexpr int group_block = block_pairs / lanes;
-  const Rows rows(bed);
+  const Rows rows(bed.grain);
   const ContactParameters law = bed.scene.with(Material::grain);
   const Sides sides = bed.sides;
   const Line difference = i_minus_j();

@@ -43,6 +43,7 @@ struct PairList {
   // Fills the last group with a pair that never touches.
   void pad(Index i, Index far_away, Index target);
   Spring<double> spring(Index place) const;
+  bool remembers(Index place) const;  // whether any number of its spring is not zero
 
   // What a part of the law remembers of each group.
   template <class Part>
@@ -52,6 +53,28 @@ struct PairList {
   template <class Part>
   const auto& of() const {
     return std::get<std::vector<typename Part::template Memory<Pack>>>(memory);
+  }
+};
+
+// Pairs of which only the distance is looked at.
+struct WatchList {
+  struct Group {
+    std::array<Offset, lanes> i, j;
+  };
+  std::vector<Group> pairs;
+  std::vector<bool> across_sides;  // groups with a pair across periodic sides
+  Index count = 0;
+
+  void clear() { pairs.clear(), across_sides.clear(), count = 0; }
+  void add(Index i, Index j, bool across) {
+    const int lane = count++ % lanes;
+    if (lane == 0) {
+      pairs.emplace_back();
+      across_sides.push_back(false);
+      pairs.back().i.fill(row_bytes * i), pairs.back().j.fill(row_bytes * j);
+    }
+    pairs.back().i[lane] = row_bytes * i, pairs.back().j[lane] = row_bytes * j;
+    if (across) across_sides.back() = true;
   }
 };
 

@@ -4,9 +4,22 @@
 
 #include "backend/host.hpp"
 #include "backend/number.hpp"
+#include "dem/cpu/pair_list.hpp"
 #include "dem/grain.hpp"
 
 namespace moraine::dem::cpu {
+
+// Grains by their offset (pair_list.hpp).
+class Rows {
+ public:
+  explicit Rows(const Host::Array<GrainRow>& grain) : grain_(reinterpret_cast<const char*>(grain.data())) {}
+  const GrainRow& grain(Offset at) const {
+    return *reinterpret_cast<const GrainRow*>(grain_ + 2 * static_cast<std::size_t>(at));
+  }
+
+ private:
+  const char* grain_;
+};
 
 // A vector and the number behind it.
 using Row = Pack;

@@ -26,7 +26,7 @@ void find_lost(const Bed& bed, Chunk& chunk, const BodyMotion& bodies) {
 class Worker {
  public:
   Worker(Schedule& schedule, const StepTasks& tasks, Exchange& exchange, Barrier& barrier, int thread,
-         const Control& control, const NearMargin& near, std::int64_t steps)
+         const Control& control, std::int64_t steps)
       : schedule_(schedule),
         bed_(schedule.bed_),
         tasks_(tasks),
@@ -36,7 +36,6 @@ class Worker {
         thread_(thread),
         layer_by_stress_(bed_.scene.body(BodyId::top_layer).x.kind == Drive::Kind::stress),
         control_(control),
-        near_(near),
         left_(steps) {
     for (Chunk& c : bed_.chunks)
       if (c.owner == thread) mine_.push_back(&c);
@@ -57,7 +56,6 @@ class Worker {
     return Schedule::Pause::done;
   }
   const Control& control() const { return control_; }
-  const NearMargin& near() const { return near_; }
   std::int64_t left() const { return left_; }
 
  private:
@@ -106,18 +104,13 @@ class Worker {
     control_.close_and_advance(bed_.scene, sum_reactions(bed_, control_.bodies));
   }
 
-  // Whether the candidates do; near lists that do not are renewed along with the forces.
   bool lists_last() {
     const double speed = fastest(bed_, control_.bodies);
     control_.moved += 2 * speed * dt();
-    near_.moved += 2 * speed * dt();
     // One step must stay in hand: a contact that opens in this step still belongs in the near list, for
     // what its spring gives up.
     control_.stale = !(control_.moved + 2 * speed * dt() < bed_.margin);
-    if (control_.stale) return false;
-    renew_ = !(near_.moved < near_.margin);
-    if (renew_) near_ = near_margin(bed_, speed, control_.moved);
-    return true;
+    return !control_.stale;
   }
 
   // Forces of the present step, and with them the grains' way to the next one where that needs no more.
@@ -129,7 +122,6 @@ class Worker {
     if (exchanges_now() && !begin_exchange(displaced)) return false;
     for (Chunk* c : mine_) take_on(*c);
     finish_waiting();
-    renew_ = false;
     return true;
   }
 
@@ -147,7 +139,7 @@ class Worker {
   void take_on(Chunk& c) {
     Schedule::Progress& progress = schedule_.progress_[c.number];
     if (!progress.take(step())) return;
-    if (renew_) renew_near_pairs(bed_, c, control_.bodies, near_.margin);
+    renew_near_pairs(bed_, c);
     // Loads that are asked for after this step go to their own place, all others to a buffer.
     const Waiting w{&c, grains_are_ahead_ ? buffers_.take(bed_.order.chunk) - c.begin : bed_.load.data()};
     for (const ChunkTask task : tasks_.at_once) task(bed_, c, {control_.bodies, step(), dt(), w.load});
@@ -215,10 +207,8 @@ class Worker {
   const int thread_;
   const bool layer_by_stress_;
   Control control_;
-  NearMargin near_;
   std::int64_t left_;
   bool grains_are_ahead_ = false;  // they have moved on to the next step, bodies have not
-  bool renew_ = false;             // near lists
   std::vector<Chunk*> mine_;
   std::vector<Waiting> waiting_;
 };
@@ -246,17 +236,16 @@ Schedule::Schedule(Bed& bed, int threads)
     for (Buffers& b : buffers_) b.push.resize(bed.order.chunk);
 }
 
-Schedule::Pause Schedule::run(const StepTasks& tasks, Exchange& exchange, Control& control, NearMargin& near,
+Schedule::Pause Schedule::run(const StepTasks& tasks, Exchange& exchange, Control& control,
                               std::int64_t& steps) {
   Barrier barrier(threads_);
   Pause pause = Pause::done;
   const Control start = control;
-  const NearMargin near_start = near;
   const std::int64_t wanted = steps;
   run_team(threads_, [&](int thread) {
-    Worker worker(*this, tasks, exchange, barrier, thread, start, near_start, wanted);
+    Worker worker(*this, tasks, exchange, barrier, thread, start, wanted);
     const Pause reason = worker.run();
-    if (thread == 0) control = worker.control(), near = worker.near(), steps = worker.left(), pause = reason;
+    if (thread == 0) control = worker.control(), steps = worker.left(), pause = reason;
   });
   return exchange.has_failed() ? Pause::failed : pause;
 }

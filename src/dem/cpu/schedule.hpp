@@ -29,8 +29,7 @@ class Schedule {
 
   // Steps until all are done, or until new candidates are needed (then control.stale, and the forces of the
   // step that it has come to are still to be done). `steps` counts down.
-  Pause run(const StepTasks& tasks, Exchange& exchange, Control& control, NearMargin& near,
-            std::int64_t& steps);
+  Pause run(const StepTasks& tasks, Exchange& exchange, Control& control, std::int64_t& steps);
 
   // Forces of all chunks where the grains are, into bed.load; dt as in ChunkStep. One thread.
   void evaluate(const StepTasks& tasks, const BodyMotion& bodies, double dt);
