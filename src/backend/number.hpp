@@ -98,15 +98,14 @@ inline Pack abs(Pack a) {
 
 // Rows a, b, c, d become columns.
 [[gnu::always_inline]] inline void transpose(Pack& a, Pack& b, Pack& c, Pack& d) {
-  using I = Pack::Bits;
-  const Pack::Lanes ab_low = __builtin_shuffle(a.v, b.v, I{0, 4, 2, 6}),
-                    ab_high = __builtin_shuffle(a.v, b.v, I{1, 5, 3, 7});
-  const Pack::Lanes cd_low = __builtin_shuffle(c.v, d.v, I{0, 4, 2, 6}),
-                    cd_high = __builtin_shuffle(c.v, d.v, I{1, 5, 3, 7});
-  a = __builtin_shuffle(ab_low, cd_low, I{0, 1, 4, 5});
-  b = __builtin_shuffle(ab_high, cd_high, I{0, 1, 4, 5});
-  c = __builtin_shuffle(ab_low, cd_low, I{2, 3, 6, 7});
-  d = __builtin_shuffle(ab_high, cd_high, I{2, 3, 6, 7});
+  const Pack::Lanes ab_low = __builtin_shufflevector(a.v, b.v, 0, 4, 2, 6),
+                    ab_high = __builtin_shufflevector(a.v, b.v, 1, 5, 3, 7);
+  const Pack::Lanes cd_low = __builtin_shufflevector(c.v, d.v, 0, 4, 2, 6),
+                    cd_high = __builtin_shufflevector(c.v, d.v, 1, 5, 3, 7);
+  a = __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5);
+  b = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);
+  c = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
+  d = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
 }
 
 // The sums of all lanes of a, b and c, in the first three lanes; each as (0 + 1) + (2 + 3).
