@@ -11,10 +11,16 @@
 #include <immintrin.h>
 #endif
 
+// Whether fma rounds once, as it does on every processor but x86-64 before FMA: bits are the same on all
+// those.
+#if defined(__FMA__) || defined(__CUDA_ARCH__) || defined(__aarch64__)
+#define MORAINE_FMA
+#endif
+
 namespace moraine {
 
 MORAINE_HD double fma(double a, double b, double c) {
-#if defined(__FMA__) || defined(__CUDA_ARCH__) || defined(__aarch64__)
+#if defined(MORAINE_FMA)
   return ::fma(a, b, c);
 #else
   return a * b + c;  // a processor without fma: emulating it would cost a hundredfold
@@ -78,6 +84,11 @@ struct Pack {
 #if defined(__FMA__)
 inline Pack fma(Pack a, Pack b, Pack c) { return _mm256_fmadd_pd(a.v, b.v, c.v); }
 inline Pack fnma(Pack a, Pack b, Pack c) { return _mm256_fnmadd_pd(a.v, b.v, c.v); }
+#elif defined(MORAINE_FMA)  // lane by lane; compilers make vectors of it
+inline Pack fma(Pack a, Pack b, Pack c) {
+  return {::fma(a[0], b[0], c[0]), ::fma(a[1], b[1], c[1]), ::fma(a[2], b[2], c[2]), ::fma(a[3], b[3], c[3])};
+}
+inline Pack fnma(Pack a, Pack b, Pack c) { return fma(-a, b, c); }
 #else
 inline Pack fma(Pack a, Pack b, Pack c) { return a * b + c; }
 inline Pack fnma(Pack a, Pack b, Pack c) { return c - a * b; }

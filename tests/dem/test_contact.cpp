@@ -1,4 +1,7 @@
 // The contact law by itself.
+#include <gtest/gtest.h>
+
+#include <cstring>
 #include <random>
 
 #include "dem/body/plane_contact.hpp"
