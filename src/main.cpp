@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <exception>
 #include <iostream>
+#include <string_view>
 
 #include "case/case.hpp"
 #include "case/import_sphere.hpp"
@@ -18,9 +19,10 @@ using namespace moraine;
 
 namespace {
 
-constexpr const char* overview =
+constexpr std::string_view overview_text =
 #include "overview.inc"
-    +1;
+    ;
+constexpr std::string_view overview = overview_text.substr(1);  // without the first end of line
 
 // Those of the script ./moraine, see there.
 const std::vector<std::string> launcher_commands = {"watch", "figures",   "report",

@@ -11,10 +11,16 @@
 #include <immintrin.h>
 #endif
 
+// Whether fma rounds once, as it does on every processor but x86-64 before FMA: bits are the same on all
+// those.
+#if defined(__FMA__) || defined(__CUDA_ARCH__) || defined(__aarch64__)
+#define MORAINE_FMA
+#endif
+
 namespace moraine {
 
 MORAINE_HD double fma(double a, double b, double c) {
-#if defined(__FMA__) || defined(__CUDA_ARCH__) || defined(__aarch64__)
+#if defined(MORAINE_FMA)
   return ::fma(a, b, c);
 #else
   return a * b + c;  // a processor without fma: emulating it would cost a hundredfold
@@ -78,6 +84,11 @@ struct Pack {
 #if defined(__FMA__)
 inline Pack fma(Pack a, Pack b, Pack c) { return _mm256_fmadd_pd(a.v, b.v, c.v); }
 inline Pack fnma(Pack a, Pack b, Pack c) { return _mm256_fnmadd_pd(a.v, b.v, c.v); }
+#elif defined(MORAINE_FMA)  // lane by lane; compilers make vectors of it
+inline Pack fma(Pack a, Pack b, Pack c) {
+  return {::fma(a[0], b[0], c[0]), ::fma(a[1], b[1], c[1]), ::fma(a[2], b[2], c[2]), ::fma(a[3], b[3], c[3])};
+}
+inline Pack fnma(Pack a, Pack b, Pack c) { return fma(-a, b, c); }
 #else
 inline Pack fma(Pack a, Pack b, Pack c) { return a * b + c; }
 inline Pack fnma(Pack a, Pack b, Pack c) { return c - a * b; }
@@ -98,15 +109,14 @@ inline Pack abs(Pack a) {
 
 // Rows a, b, c, d become columns.
 [[gnu::always_inline]] inline void transpose(Pack& a, Pack& b, Pack& c, Pack& d) {
-  using I = Pack::Bits;
-  const Pack::Lanes ab_low = __builtin_shuffle(a.v, b.v, I{0, 4, 2, 6}),
-                    ab_high = __builtin_shuffle(a.v, b.v, I{1, 5, 3, 7});
-  const Pack::Lanes cd_low = __builtin_shuffle(c.v, d.v, I{0, 4, 2, 6}),
-                    cd_high = __builtin_shuffle(c.v, d.v, I{1, 5, 3, 7});
-  a = __builtin_shuffle(ab_low, cd_low, I{0, 1, 4, 5});
-  b = __builtin_shuffle(ab_high, cd_high, I{0, 1, 4, 5});
-  c = __builtin_shuffle(ab_low, cd_low, I{2, 3, 6, 7});
-  d = __builtin_shuffle(ab_high, cd_high, I{2, 3, 6, 7});
+  const Pack::Lanes ab_low = __builtin_shufflevector(a.v, b.v, 0, 4, 2, 6),
+                    ab_high = __builtin_shufflevector(a.v, b.v, 1, 5, 3, 7);
+  const Pack::Lanes cd_low = __builtin_shufflevector(c.v, d.v, 0, 4, 2, 6),
+                    cd_high = __builtin_shufflevector(c.v, d.v, 1, 5, 3, 7);
+  a = __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5);
+  b = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);
+  c = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
+  d = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
 }
 
 // The sums of all lanes of a, b and c, in the first three lanes; each as (0 + 1) + (2 + 3).

@@ -18,6 +18,8 @@ class SpinWait {
     if (++turns_ < 1000) {
 #if defined(__x86_64__)
       __builtin_ia32_pause();
+#elif defined(__aarch64__)
+      asm volatile("isb");  // waits about as long
 #endif
     } else {
       sched_yield();

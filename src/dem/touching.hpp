@@ -19,7 +19,10 @@ class TouchingPairs {
   void each(const Scene& scene, const GrainRow* grains, Index n, Visit&& visit) {
     double r_max = 0;
     for (Index i = 0; i < n; ++i) r_max = std::max(r_max, grains[i].r);
-    const auto [grid, order, first, end] = neighbours_.sort_into_cells(Host{}, scene, grains, n, 2 * r_max);
+    // By names, because clang 14 lets no lambda see a structured binding.
+    const auto cells = neighbours_.sort_into_cells(Host{}, scene, grains, n, 2 * r_max);
+    const CellGrid& grid = cells.grid;
+    const std::int32_t *const order = cells.order, *const first = cells.first, *const end = cells.end;
     for (std::vector<double>* const list : {&x_, &y_, &z_, &r_})
       list->resize(n + Pack::width);  // to a full pack
     for (Index k = 0; k < n; ++k) {

@@ -26,7 +26,7 @@ void linear_sum(double a, N_Vector x, double b, N_Vector y, N_Vector z) {
   const double *from = NV_DATA_S(x), *other = NV_DATA_S(y);
   double* to = NV_DATA_S(z);  // may be x or y themselves, never a shifted part of them
   const sunindextype n = NV_LENGTH_S(x);
-#pragma GCC ivdep
+#pragma omp simd
   for (sunindextype i = 0; i < n; ++i) to[i] = a * from[i] + b * other[i];
 }
 

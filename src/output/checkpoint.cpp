@@ -27,6 +27,8 @@ struct Member {
   const char* name;
   M T::*pointer;
 };
+template <class T, class M>
+Member(const char*, M T::*) -> Member<T, M>;
 
 template <class T>
 constexpr std::tuple<> members{};

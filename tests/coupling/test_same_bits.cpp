@@ -1,4 +1,6 @@
 // The same bits for any number of threads, on the GPU's loop, and after a restart.
+#include <cstring>
+
 #include "wet_scenes.hpp"
 
 namespace moraine::coupling {

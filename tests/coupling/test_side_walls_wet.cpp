@@ -1,5 +1,6 @@
 // Water in a bed between four walls.
 #include "coupling/walls.hpp"
+#include "physics/same_bits.hpp"
 #include "wet_scenes.hpp"
 
 namespace moraine::coupling {

@@ -1,5 +1,7 @@
 // Packings in water that several tests share.
 #pragma once
+#include <gtest/gtest.h>
+
 #include "../physics/scenes.hpp"
 #include "coupling/pore_water.hpp"
 #include "error.hpp"

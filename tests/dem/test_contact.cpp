@@ -1,4 +1,7 @@
 // The contact law by itself.
+#include <gtest/gtest.h>
+
+#include <cstring>
 #include <random>
 
 #include "dem/body/plane_contact.hpp"
@@ -237,7 +240,7 @@ TEST(ContactLaw, ViscousWallWithoutSpring) {
   const Plane floor{.id = BodyId::floor};
   for (const double v : {0.01, 0.1, 0.149, 0.151, 1.0}) {
     Spring<double> spring;
-    const GrainRow grain{{0, 0, r - overlap}, r, {v, 0, 0}, r, {0, 0, 0}, 0};
+    const GrainRow grain{{0, 0, r - overlap}, r, {v, 0, 0}, r, {0, 0, 0}, 0, {}, 0};
     for (int step = 0; step < 100; ++step) {  // the same at every step
       const auto a = plane_action<Viscous, energy>(s, 1e-5, floor, grain, spring);
       EXPECT_NEAR(a.f.x, -std::min(20 * v, 0.3 * f_n), 1e-12 * f_n);
@@ -253,9 +256,9 @@ TEST(ContactLaw, TopWallMirrorsTheFloor) {
   Spring<double> below, above;
   const Plane floor{.id = BodyId::floor}, top{.id = BodyId::top_wall, .facing = -1, .place = 1};
   const Vec3d v{0.1, -0.2, -0.05}, omega{3, 4, 5};
-  const GrainRow low{{0, 0, 0.99 * r}, r, v, r, omega, 0};
+  const GrainRow low{{0, 0, 0.99 * r}, r, v, r, omega, 0, {}, 0};
   const Vec3d v_up{v.x, v.y, -v.z}, omega_up{-omega.x, -omega.y, omega.z};
-  const GrainRow high{{0, 0, 1 - 0.99 * r}, r, v_up, r, omega_up, 0};
+  const GrainRow high{{0, 0, 1 - 0.99 * r}, r, v_up, r, omega_up, 0, {}, 0};
   const auto a = plane_action<Viscous, energy>(s, 1e-5, floor, low, below);
   const auto b = plane_action<Viscous, energy>(s, 1e-5, top, high, above);
   EXPECT_LT(length(b.f - Vec3d{a.f.x, a.f.y, -a.f.z}), 1e-12 * length(a.f));
@@ -276,7 +279,7 @@ TEST(ContactLaw, PlanesAreAlikeAlongEveryAxis) {
         .id = BodyId::x_low, .axis = axis, .facing = facing, .place = 0.5, .v = turned(plane_v)};
     Spring<double> spring;
     spring.delta_t = turned({1e-6, 2e-6, 0});
-    const GrainRow grain{turned({0.3, 0.4, 0.5 + facing * 0.99 * r}), r, turned(v), r, turned(omega), 0};
+    const GrainRow grain{turned({0.3, 0.4, 0.5 + facing * 0.99 * r}), r, turned(v), r, turned(omega), 0, {}, 0};
     const auto a = plane_action<Viscous, energy>(s, 1e-5, plane, grain, spring);
     const auto back = [&](const Vec3d& b) {
       Vec3d out{};

@@ -94,8 +94,8 @@ struct Failing : FluidCoupling {
 
 // Also where several threads are under way; and an engine is good for another run afterwards.
 TEST(SurroundingsThatFail, EndARunByTheirError) {
-  auto [scene, state] = cloud(Failing::grains, 0.26, 3);
-  scene.exchange_interval = 1;
+  Bed bed = cloud(Failing::grains, 0.26, 3);
+  bed.scene.exchange_interval = 1;
   for (const Backend backend : {Backend::cpu, Backend::reference})
     for (const int threads : {1, 2, 4})
       for (const bool in_remap : {false, true})
@@ -103,7 +103,7 @@ TEST(SurroundingsThatFail, EndARunByTheirError) {
           Failing failing(at, in_remap);
           const auto engine = make_engine(backend, threads);
           const auto run = [&] {
-            engine->load(scene, state, &failing);
+            engine->load(bed.scene, bed.state, &failing);
             engine->advance(40);
           };
           try {

@@ -6,6 +6,7 @@
 
 #include "backends.hpp"
 #include "dem/gpu/gather_engine.hpp"
+#include "physics/same_bits.hpp"
 #include "physics/scenes.hpp"
 
 namespace moraine::dem {

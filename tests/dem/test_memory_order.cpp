@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "backends.hpp"
+#include "physics/same_bits.hpp"
 #include "physics/scenes.hpp"
 
 namespace moraine::dem {

@@ -1,6 +1,8 @@
 // Neighbour lists against a search of all pairs.
 #include "dem/neighbours.hpp"
 
+#include <gtest/gtest.h>
+
 #include <map>
 #include <random>
 

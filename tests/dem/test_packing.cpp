@@ -1,6 +1,7 @@
 #include "dem/packing.hpp"
 
 #include "error.hpp"
+#include "physics/same_bits.hpp"
 #include "physics/scenes.hpp"
 
 namespace moraine::dem {

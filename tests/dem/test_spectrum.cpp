@@ -1,6 +1,8 @@
 // Contact networks with known spectra, and what a run does on either side of the critical step.
 #include "dem/spectrum.hpp"
 
+#include <gtest/gtest.h>
+
 #include "error.hpp"
 #include "physics/scenes.hpp"
 

@@ -1,6 +1,8 @@
 // What a scene does not use is not compiled into its loop, and so costs nothing.
 #include "dem/uses.hpp"
 
+#include <gtest/gtest.h>
+
 #include "physics/scenes.hpp"
 
 namespace moraine::dem {

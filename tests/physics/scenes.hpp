@@ -1,11 +1,7 @@
-// Scenes and comparisons that several tests share.
+// Scenes that several tests share.
 #pragma once
-#include <gtest/gtest.h>
-
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstring>
 #include <numbers>
 #include <random>
 #include <vector>
@@ -78,29 +74,30 @@ inline std::vector<double> orders(const std::vector<double>& dt, const std::vect
   return slope;
 }
 
-// Three hundred soft grains of mixed size that came to rest under their weight; x and y are periodic.
 struct Bed {
   Scene scene;
   State state;
 };
-inline const Bed& settled_bed() {
-  static const Bed bed = [] {
-    Packing p;
-    p.count = 300, p.columns_x = p.columns_y = 5;
-    p.radius_mean = 0.01, p.radius_std = 0.0005, p.cell = 1.06, p.seed = 3;
-    const Lattice lattice = make_lattice(p);
-    Scene s;
-    s.box = {lattice.box_x, lattice.box_y, 1};
-    s.contact.fill(LinearContact{1e5, 1e5, 20, 8, 0.5, 0.5});
-    s.dt = 0.1 * std::sqrt(mass(s, 0.008) / s.with(Material::grain).k_n);
-    State state = lattice.state;
-    sort_spatially(s, state);
-    const auto engine = make_engine(Backend::cpu, 1);
-    Bed out{s, run(*engine, s, state, 60000)};
-    synchronise(out.scene, out.state);
-    out.state.step = 0, out.state.ledger = {};
-    return out;
-  }();
+// Three hundred soft grains of mixed size after so many steps under their weight; x and y are periodic.
+inline Bed bed_after(std::int64_t steps) {
+  Packing p;
+  p.count = 300, p.columns_x = p.columns_y = 5;
+  p.radius_mean = 0.01, p.radius_std = 0.0005, p.cell = 1.06, p.seed = 3;
+  const Lattice lattice = make_lattice(p);
+  Scene s;
+  s.box = {lattice.box_x, lattice.box_y, 1};
+  s.contact.fill(LinearContact{1e5, 1e5, 20, 8, 0.5, 0.5});
+  s.dt = 0.1 * std::sqrt(mass(s, 0.008) / s.with(Material::grain).k_n);
+  State state = lattice.state;
+  sort_spatially(s, state);
+  const auto engine = make_engine(Backend::cpu, 1);
+  Bed out{s, run(*engine, s, state, steps)};
+  synchronise(out.scene, out.state);
+  out.state.step = 0, out.state.ledger = {};
+  return out;
+}
+inline const Bed& settled_bed() {  // at rest
+  static const Bed bed = bed_after(60000);
   return bed;
 }
 
@@ -119,8 +116,7 @@ inline void shear(Bed& bed) {
   s.body(BodyId::top_wall) = wall_pressed_by(500, 0.5);
   drive_top_layer(s, Drive::at(0.2));
 }
-inline Bed sheared_bed() {
-  Bed bed = settled_bed();
+inline Bed sheared_bed(Bed bed = settled_bed()) {
   shear(bed);
   return bed;
 }
@@ -156,19 +152,18 @@ inline Bed column_between_walls(Index count, int columns, double wall_mu, std::i
   bed.state.step = 0, bed.state.ledger = {};
   return bed;
 }
-inline const Bed& walled_bed() {  // as many grains as the settled bed
-  static const Bed bed = column_between_walls(300, 5, 0.4, 45000);
+inline Bed walled_bed_after(std::int64_t steps) { return column_between_walls(300, 5, 0.4, steps); }
+inline const Bed& walled_bed() {  // as many grains as the settled bed, at rest
+  static const Bed bed = walled_bed_after(45000);
   return bed;
 }
 // Its side wall moves in: 0.5 mm in a hundredth of a second.
-inline Bed squeezed_bed() {
-  Bed bed = walled_bed();
+inline Bed squeezed_bed(Bed bed = walled_bed()) {
   bed.scene.body(BodyId::x_low).x = Drive::at(0.05);
   return bed;
 }
 // Sheared by its top layer along the walls at y; x is periodic.
-inline Bed sheared_between_walls() {
-  Bed bed = walled_bed();
+inline Bed sheared_between_walls(Bed bed = walled_bed()) {
   bed.scene.periodic_x = true;
   bed.scene.body(BodyId::x_low) = bed.scene.body(BodyId::x_high) = {};
   std::erase_if(bed.state.wall_contacts,
@@ -219,38 +214,6 @@ inline double carried(const State& s, const std::vector<ContactForce>& contacts,
     if (s.x[c.j].z > z && s.x[c.i].z <= z) sum -= f;
   }
   return sum;
-}
-
-// Every number of the two states, bit by bit.
-inline void expect_same_bits(const State& a, const State& b) {
-  const auto same = [](const auto& p, const auto& q, const char* name) {
-    ASSERT_EQ(p.size(), q.size()) << name;
-    using T = std::decay_t<decltype(p[0])>;
-    for (std::size_t k = 0; k < p.size(); ++k)
-      ASSERT_EQ(std::memcmp(&p[k], &q[k], sizeof(T)), 0) << name << "[" << k << "] differs";
-  };
-  same(a.id, b.id, "id"), same(a.r, b.r, "r"), same(a.part_of, b.part_of, "part_of");
-  same(a.x, b.x, "x"), same(a.v, b.v, "v"), same(a.omega, b.omega, "omega");
-  same(a.rotation, b.rotation, "rotation"), same(a.force, b.force, "force"),
-      same(a.torque, b.torque, "torque");
-  same(a.x_start, b.x_start, "x_start");
-  same(a.contacts, b.contacts, "contacts");
-  const auto members = [](const std::vector<WallContact>& contacts) {  // without what lies between them
-    std::vector<std::array<double, 12>> out;
-    for (const auto& [i, wall, s] : contacts) {
-      const Vec3d &d = s.delta_t, &v = s.v_before, &f = s.f_viscous;
-      out.push_back({double(i), double(wall), d.x, d.y, d.z, s.slipping, v.x, v.y, v.z, f.x, f.y, f.z});
-    }
-    return out;
-  };
-  same(members(a.wall_contacts), members(b.wall_contacts), "wall_contacts");
-  const auto numbers = [](const State& s) {
-    const Ledger& l = s.ledger;
-    return std::vector<double>{l.slip, l.viscous, l.planes, l.layers};
-  };
-  same(a.bodies, b.bodies, "bodies"), same(numbers(a), numbers(b), "ledger");
-  EXPECT_EQ(a.step, b.step);
-  EXPECT_EQ(a.staggered, b.staggered);
 }
 
 }  // namespace moraine::dem

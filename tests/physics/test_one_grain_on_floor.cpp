@@ -137,7 +137,7 @@ Incline roll_down(double theta, double mu, double l_expected) {
   const Mobility mobility_of = mobility(s, R, BodyId::none);
   const Triple dt(Vec3d{s.dt, s.dt, s.dt});
   const Plane floor{.id = BodyId::floor};
-  GrainRow grain{{0, 0, R - normal / s.with(Material::wall).k_n}, R, {0, 0, 0}, R, {0, 0, 0}, 0};
+  GrainRow grain{{0, 0, R - normal / s.with(Material::wall).k_n}, R, {0, 0, 0}, R, {0, 0, 0}, 0, {}, 0};
   Spring<double> spring;
   spring.delta_t.x = hold / s.with(Material::wall).k_t;
   Vec3d f{-hold, 0, normal}, torque{0, l_expected * hold, 0}, rotation{0, 0, 0};

@@ -64,7 +64,7 @@ class ReferenceBits : public Program, public testing::WithParamInterface<Referen
   }
 
   void SetUp() override {
-#ifndef __FMA__
+#ifndef MORAINE_FMA
     GTEST_SKIP() << "compiled without FMA, which rounds otherwise; the table was made with it";
 #endif
     if (GetParam().wet() && !coupling::water_built()) GTEST_SKIP() << "this build has no pore water in it";

@@ -135,6 +135,8 @@ std::string PairEngine::describe() const {
   const char* set = "AVX2";
 #elif defined(__x86_64__)
   const char* set = "SSE2";
+#elif defined(__aarch64__)
+  const char* set = "NEON";
 #else
   const char* set = "portable SIMD";
 #endif

@@ -45,7 +45,7 @@ struct PartList {
     (use.template operator()<Parts>(), ...);
   }
   // A list of each part's memory.
-  template <template <class> class List, class T>
+  template <template <class...> class List, class T>
   using MemoryLists =
       std::tuple<List<Coulomb::Memory<T>>, List<SofteningCoulomb::Memory<T>>, List<Viscosity::Memory<T>>,
                  List<ViscousWork::Memory<T>>, List<typename Parts::template Memory<T>>...>;

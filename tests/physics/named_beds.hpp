@@ -1,0 +1,41 @@
+// Small beds that between them use every part of the law, of walls and of layers.
+#pragma once
+#include <vector>
+
+#include "physics/scenes.hpp"
+
+namespace moraine::dem {
+
+struct NamedBed {
+  const char* name;
+  Bed bed;
+};
+inline void damp_grains(Scene& s, double gamma) {
+  s.with(Material::grain).gamma_n = s.with(Material::grain).gamma_t = gamma;
+}
+// From a bed without side walls and one with them.
+inline std::vector<NamedBed> named_beds(const Bed& open, const Bed& walled) {
+  std::vector<NamedBed> a{{"sheared bed, damped walls", sheared_bed(open)},
+                          {"softening", sheared_bed(open)},
+                          {"layer driven by stress", sheared_bed(open)},
+                          {"held height", sheared_bed(open)},
+                          {"swinging load, walls with k_t = 0, no ledger", sheared_bed(open)},
+                          {"damped grains", sheared_bed(open)},
+                          {"no friction", sheared_bed(open)},
+                          {"cloud", cloud(700, 0.2, 5)},
+                          {"small box", cloud(22, 0.065, 5)},
+                          {"a side wall moves in", squeezed_bed(walled)},
+                          {"sheared along side walls", sheared_between_walls(walled)}};
+  for (ContactParameters& p : a[1].bed.scene.contact) p.mu_d = 0.3;
+  drive_top_layer(a[2].bed.scene, Drive::by(400));
+  damp_grains(a[2].bed.scene, 5);
+  drive_top_layer(a[3].bed.scene, Drive::at(0.2), true);
+  Drive& load = a[4].bed.scene.body(BodyId::top_wall).z;
+  load.amplitude = 200, load.frequency = 30;
+  a[4].bed.scene.with(Material::wall).k_t = 0, a[4].bed.scene.ledger = false;
+  damp_grains(a[5].bed.scene, 5);
+  for (ContactParameters& p : a[6].bed.scene.contact) p.mu_s = p.mu_d = 0;
+  return a;
+}
+
+}  // namespace moraine::dem
