@@ -57,6 +57,14 @@ void with_laws(const Scene& s, Use&& use) {
   if (!found) throw error("internal: no row of CompiledLaws has all that the scene asks for");
 }
 
+// Which row of CompiledLaws it is.
+template <class Row>
+constexpr int row_number = []<class... Rows>(std::tuple<Rows...>*) {
+  int number = 0;
+  const bool found = ((std::is_same_v<Row, Rows> || (++number, false)) || ...);
+  return found ? number : -1;
+}(static_cast<CompiledLaws*>(nullptr));
+
 // What it asks for, and what else the row has that it takes.
 inline Uses uses_of(const Scene& s) {
   Uses u = asked_by(s);

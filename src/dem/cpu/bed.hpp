@@ -43,11 +43,11 @@ struct alignas(64) Chunk {
   int owner = 0;
   std::vector<Candidate> candidates[2];  // inside the chunk, across
   PairList near[2], spare;
-  WatchList watched[2];  // candidates that are not near
-  double near_margin;    // m, of the near pairs
-  int steps_near = 0;    // since they were drawn
+  WatchList watched[2];           // candidates that are not near
+  double near_margin;             // m, of the near pairs
+  int steps_near = 0;             // since they were drawn
   std::vector<PlanePair> planes;  // within the neighbour margin, sorted by grain, then plane
-  std::vector<Index> incoming;  // links, by the chunk they come from
+  std::vector<Index> incoming;    // links, by the chunk they come from
   std::vector<Index> outgoing;
   std::array<std::vector<Index>, most_servos> members;  // its grains in each servo's layer
   Index lost = -1;                                      // a grain that went wrong

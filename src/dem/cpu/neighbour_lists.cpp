@@ -52,11 +52,11 @@ void draw_pairs(Bed& bed, Chunk& chunk, int part) {
   WatchList& watched = chunk.watched[part];
   list.clear(), watched.clear();
   std::vector<Candidate>& candidates = chunk.candidates[part];
-  for (std::size_t start = 0; start < candidates.size(); start += lanes) {
-    const int used = static_cast<int>(std::min<std::size_t>(lanes, candidates.size() - start));
-    Line lines[lanes];
+  for (std::size_t start = 0; start < candidates.size(); start += Pack::width) {
+    const int used = static_cast<int>(std::min<std::size_t>(Pack::width, candidates.size() - start));
+    Line lines[Pack::width];
     Pack c[8];
-    for (int k = 0; k < lanes; ++k) {
+    for (int k = 0; k < Pack::width; ++k) {
       const Candidate& q = candidates[start + std::min(k, used - 1)];
       lines[k] = fma(difference, line(grain[q.j]), line(grain[q.i]));
     }
@@ -110,11 +110,12 @@ bool any_touches(const Bed& bed, const WatchList& watched) {
   Pack least(1.0);
   for (std::size_t g = 0; g < watched.pairs.size(); ++g) {
     const WatchList::Group& p = watched.pairs[g];
-    Row c[lanes];
-    for (int k = 0; k < lanes; ++k) c[k] = fma(difference, row(rows.grain(p.j[k])), row(rows.grain(p.i[k])));
+    Row c[Pack::width];
+    for (int k = 0; k < Pack::width; ++k)
+      c[k] = fma(difference, row(rows.grain(p.j[k])), row(rows.grain(p.i[k])));
     transpose(c[0], c[1], c[2], c[3]);
     Vec3<Pack> d{c[0], c[1], c[2]};
-    if (watched.across_sides[g]) d = nearest_image(bed.sides, d);
+    if (p.across_sides) d = nearest_image(bed.sides, d);
     const Pack reach = slack * c[3];
     least = min(fnma(reach, reach, dot(d, d)), least);
   }

@@ -1,5 +1,5 @@
-// Near pairs of one chunk, as the SIMD loop reads them: groups of as many pairs as there are lanes, by (i,
-// j).
+// Near pairs of one chunk, as the SIMD loop reads them: groups of eight pairs, by (i, j), which it takes in
+// one or more packs.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -17,24 +17,48 @@ using Offset = std::uint32_t;
 constexpr Offset row_bytes = sizeof(LoadRow);
 static_assert(sizeof(GrainRow) == 2 * row_bytes);
 
-constexpr int lanes = Pack::width;
+constexpr int lanes = 8;
 
 struct PairGroup {
   std::array<Offset, lanes> i, j;
   std::array<Offset, lanes> target;  // where j's share goes: j itself, or (from the first slot) a slot
+  bool across_sides;                 // whether a pair touches across periodic sides
 };
 
-inline void set_lane(Pack& to, double number, int lane) { to.v[lane] = number; }
-inline void set_lane(Vec3<Pack>& to, const Vec3d& v, int lane) {
+// A number of each pair of a group.
+struct alignas(64) Lanes {
+  double v[lanes] = {};
+};
+inline void set_lane(Lanes& to, double number, int lane) { to.v[lane] = number; }
+inline void set_lane(Vec3<Lanes>& to, const Vec3d& v, int lane) {
   to.x.v[lane] = v.x, to.y.v[lane] = v.y, to.z.v[lane] = v.z;
 }
-inline void get_lane(double& to, const Pack& p, int lane) { to = p[lane]; }
-inline void get_lane(Vec3d& to, const Vec3<Pack>& v, int lane) { to = {v.x[lane], v.y[lane], v.z[lane]}; }
+inline void get_lane(double& to, const Lanes& p, int lane) { to = p.v[lane]; }
+inline void get_lane(Vec3d& to, const Vec3<Lanes>& v, int lane) {
+  to = {v.x.v[lane], v.y.v[lane], v.z.v[lane]};
+}
+
+// As many of them as P has lanes, from `lane` on.
+template <class P>
+void load_lanes(P& p, const Lanes& from, std::int64_t lane) {
+  p = P::load(from.v + lane);
+}
+template <class P>
+void load_lanes(Vec3<P>& p, const Vec3<Lanes>& from, std::int64_t lane) {
+  load_lanes(p.x, from.x, lane), load_lanes(p.y, from.y, lane), load_lanes(p.z, from.z, lane);
+}
+template <class P>
+void store_lanes(const P& p, Lanes& to, std::int64_t lane) {
+  p.store(to.v + lane);
+}
+template <class P>
+void store_lanes(const Vec3<P>& p, Vec3<Lanes>& to, std::int64_t lane) {
+  store_lanes(p.x, to.x, lane), store_lanes(p.y, to.y, lane), store_lanes(p.z, to.z, lane);
+}
 
 struct PairList {
   std::vector<PairGroup> pairs;
-  MoreParts::MemoryLists<std::vector, Pack> memory;  // by group
-  std::vector<bool> across_sides;                    // groups with a pair that touches across periodic sides
+  MoreParts::MemoryLists<std::vector, Lanes> memory;  // by group
   Index count = 0;
 
   void clear();
@@ -48,45 +72,44 @@ struct PairList {
   // What a part of the law remembers of each group.
   template <class Part>
   auto& of() {
-    return std::get<std::vector<typename Part::template Memory<Pack>>>(memory);
+    return std::get<std::vector<typename Part::template Memory<Lanes>>>(memory);
   }
   template <class Part>
   const auto& of() const {
-    return std::get<std::vector<typename Part::template Memory<Pack>>>(memory);
+    return std::get<std::vector<typename Part::template Memory<Lanes>>>(memory);
   }
 };
 
 // Pairs of which only the distance is looked at.
 struct WatchList {
   struct Group {
-    std::array<Offset, lanes> i, j;
+    std::array<Offset, Pack::width> i, j;
+    bool across_sides;  // whether a pair is across periodic sides
   };
   std::vector<Group> pairs;
-  std::vector<bool> across_sides;  // groups with a pair across periodic sides
   Index count = 0;
 
-  void clear() { pairs.clear(), across_sides.clear(), count = 0; }
+  void clear() { pairs.clear(), count = 0; }
   void add(Index i, Index j, bool across) {
-    const int lane = count++ % lanes;
+    const int lane = count++ % Pack::width;
     if (lane == 0) {
-      pairs.emplace_back();
-      across_sides.push_back(false);
-      pairs.back().i.fill(row_bytes * i), pairs.back().j.fill(row_bytes * j);
+      Group& group = pairs.emplace_back();
+      group.i.fill(row_bytes * i), group.j.fill(row_bytes * j), group.across_sides = false;
     }
-    pairs.back().i[lane] = row_bytes * i, pairs.back().j[lane] = row_bytes * j;
-    if (across) across_sides.back() = true;
+    Group& group = pairs.back();
+    group.i[lane] = row_bytes * i, group.j[lane] = row_bytes * j;
+    group.across_sides |= across;
   }
 };
 
 inline Index PairList::add(Index i, Index j, Index target, bool across, const Spring<double>& s) {
   const int lane = count % lanes;
   if (lane == 0) {
-    pairs.emplace_back();
-    across_sides.push_back(false);
+    pairs.emplace_back().across_sides = false;
   }
   PairGroup& p = pairs.back();
   p.i[lane] = row_bytes * i, p.j[lane] = row_bytes * j, p.target[lane] = row_bytes * target;
-  if (across) across_sides.back() = true;
+  p.across_sides |= across;
   MoreParts::for_each_memory([&]<class Part>() {
     if (lane == 0) of<Part>().emplace_back();
     const typename Part::template Memory<double>& from = s;

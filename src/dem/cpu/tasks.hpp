@@ -28,10 +28,12 @@ struct StepTasks {
 StepTasks tasks_for(const Scene& scene);
 
 // The function for a task, by room.
-ChunkTask pair_forces_for(const Scene& scene);   // pair_forces.cpp
-ChunkTask shares_for(const Scene& scene);        // body_forces.cpp
-ChunkTask plane_forces_for(const Scene& scene);  //
-ChunkTask layer_forces_for(const Scene& scene);  //
-ChunkTask motion_for(const Scene& scene);        // motion.cpp
+ChunkTask pair_forces_for(const Scene& scene);         // pair_forces.cpp
+bool has_wide_lanes();                                 // whether it takes AVX-512
+ChunkTask wide_pair_forces(int row, Account account);  // pair_forces_wide.cpp; row: of CompiledLaws
+ChunkTask shares_for(const Scene& scene);              // body_forces.cpp
+ChunkTask plane_forces_for(const Scene& scene);        //
+ChunkTask layer_forces_for(const Scene& scene);        //
+ChunkTask motion_for(const Scene& scene);              // motion.cpp
 
 }  // namespace moraine::dem::cpu

@@ -1,0 +1,161 @@
+// The loop over near pairs: as many at a time as P, a Pack or a Wide, has lanes.
+//
+// Short phases over a block of packs: gather rows and turn them into lanes, the three parts of the law, turn
+// back and add up. One pack alone is a long chain of dependent operations; in phases the processor works on
+// several at once.
+#pragma once
+#include <algorithm>
+#include <tuple>
+#include <type_traits>
+
+#include "dem/cpu/rows.hpp"
+#include "dem/cpu/tasks.hpp"
+
+namespace moraine::dem::cpu {
+
+constexpr int block_pairs = 16;  // that go through the phases together
+
+// Where j's share of a pair goes.
+enum class Shares { in_place, to_slots };
+
+// A line of eight numbers for each lane of a P, and what is done with lines; given for each P.
+template <class P>
+struct Lines;
+
+// What the loop reads of as many pairs as P has lanes.
+template <class P>
+struct Gathered {
+  Vec3<P> x_ij;
+  P r_sum, r_difference;
+  Motion<P> before;
+};
+
+template <class L, class P>
+inline void gather(const Rows& rows, const Sides& sides, const Offset* at_i, const Offset* at_j,
+                   bool across_sides, Gathered<P>& q) {
+  typename Lines<P>::Line lines[P::width];
+  P c[8];
+  const auto difference = Lines<P>::i_minus_j();
+  for (int k = 0; k < P::width; ++k)
+    lines[k] = fma(difference, Lines<P>::load(&rows.grain(at_j[k])), Lines<P>::load(&rows.grain(at_i[k])));
+  to_columns(lines, c);
+  Vec3<P> x_ij{c[0], c[1], c[2]};
+  if (across_sides) x_ij = nearest_image(sides, x_ij);
+  q.x_ij = x_ij, q.r_sum = c[7], q.r_difference = c[3];
+  q.before.v = {c[4], c[5], c[6]};
+  if constexpr (L::rubs) {
+    for (int k = 0; k < P::width; ++k)
+      lines[k] = Lines<P>::two_rows(&rows.grain(at_i[k]).omega, &rows.grain(at_j[k]).omega);
+    to_columns(lines, c);
+    q.before.omega_i = {c[0], c[1], c[2]}, q.before.omega_j = {c[4], c[5], c[6]};
+  }
+}
+
+// Turns what pairs do to their grains back into lines and adds them up, or leaves j's share in its slot.
+template <class L, Shares shares, class P>
+inline void scatter(const Offset* at_i, const Offset* at_target, const Geometry<P>& at, const Action<P>& a,
+                    LoadRow* load, LoadRow* slot) {
+  const auto row_at = [](LoadRow* first, Offset o) {
+    return reinterpret_cast<double*>(reinterpret_cast<char*>(first) + o);
+  };
+  constexpr bool to_slots = shares == Shares::to_slots;
+  const P columns[8] = {a.f.x, a.f.y, a.f.z, a.slip, a.f_x_n.x, a.f_x_n.y, a.f_x_n.z, a.viscous};
+  typename Lines<P>::Line action[P::width];
+  to_lines(columns, action);
+  alignas(64) double l_i[P::width] = {}, l_j[P::width] = {};
+  if constexpr (L::rubs) at.l_i.store(l_i), at.l_j.store(l_j);
+  for (int k = 0; k < P::width; ++k) {
+    double *const i = row_at(load, at_i[k]), *const j = row_at(to_slots ? slot : load, at_target[k]);
+    fma(Lines<P>::on_i(l_i[k]), action[k], Lines<P>::load(i)).store(i);
+    const auto on_j = Lines<P>::on_j(l_j[k]);
+    (to_slots ? on_j * action[k] : fma(on_j, action[k], Lines<P>::load(j))).store(j);
+  }
+}
+
+// What the law remembers of as many pairs, the first of which has this place; and no more.
+template <class L, Account account, class P>
+inline Spring<P> recalled(const PairList& list, std::int64_t place) {
+  Spring<P> spring;
+  MoreParts::for_each_memory([&]<class Part>() {
+    if constexpr (L::template remembers<Part, account>) {
+      typename Part::template Memory<P>& to = spring;
+      for_each_named(to, list.of<Part>()[place / lanes],
+                     [&](const char*, auto& p, const auto& group) { load_lanes(p, group, place % lanes); });
+    }
+  });
+  return spring;
+}
+template <class L, Account account, class P>
+inline void remember(const Spring<P>& spring, PairList& list, std::int64_t place) {
+  MoreParts::for_each_memory([&]<class Part>() {
+    if constexpr (L::template remembers<Part, account>) {
+      const typename Part::template Memory<P>& from = spring;
+      for_each_named(from, list.of<Part>()[place / lanes],
+                     [&](const char*, const auto& p, auto& group) { store_lanes(p, group, place % lanes); });
+    }
+  });
+}
+
+template <class L, Account account, Shares shares, class P>
+[[gnu::flatten]] void list_forces(Bed& bed, PairList& list, double dt, LoadRow* load) {
+  constexpr int packs = block_pairs / P::width, packs_in_group = lanes / P::width;
+  const Rows rows(bed.grain);
+  const ContactParameters law = bed.scene.with(Material::grain);
+  const Sides sides = bed.sides;
+  LoadRow* const slot = bed.slot.data();
+
+  Gathered<P> motion[packs];
+  Geometry<P> geometry[packs];
+  Slide<P> slides[packs];
+  Vec3<P> delta_t[packs], v[packs];
+  Grip<P> grips[packs];
+  const auto v_c = [&](int q) -> const Vec3<P>& {
+    if constexpr (L::rubs)
+      return slides[q].v_c;
+    else
+      return motion[q].before.v;
+  };
+
+  const auto all = static_cast<std::int64_t>(list.pairs.size()) * packs_in_group;
+  for (std::int64_t start = 0; start < all; start += packs) {
+    const int block = static_cast<int>(std::min<std::int64_t>(packs, all - start));
+    const auto group = [&](int q) -> const PairGroup& { return list.pairs[(start + q) / packs_in_group]; };
+    const auto lane = [&](int q) { return static_cast<int>((start + q) % packs_in_group) * P::width; };
+    const auto place = [&](int q) { return (start + q) * P::width; };
+
+    for (int q = 0; q < block; ++q) {
+      const PairGroup& p = group(q);
+      gather<L>(rows, sides, &p.i[lane(q)], &p.j[lane(q)], p.across_sides, motion[q]);
+    }
+    for (int q = 0; q < block; ++q) {
+      geometry[q] = between_grains(motion[q].x_ij, motion[q].r_sum, motion[q].r_difference);
+      if constexpr (L::rubs) slides[q] = slide(dt, geometry[q], motion[q].before);
+    }
+    for (int q = 0; q < block; ++q) {
+      const std::int64_t later = std::min(start + q + packs, all - 1);
+      const Offset* const at_j = &list.pairs[later / packs_in_group].j[later % packs_in_group * P::width];
+      for (int k = 0; k < P::width; ++k)
+        __builtin_prefetch(&rows.grain(at_j[k]).x), __builtin_prefetch(&rows.grain(at_j[k]).omega);
+      const Spring<P> spring = recalled<L, account, P>(list, place(q));
+      if constexpr (L::rubs) delta_t[q] = carry(dt, geometry[q], slides[q], spring.delta_t);
+      v[q] = velocity_at_step<L>(dt, v_c(q), spring);
+      grips[q] = grip<L>(law, geometry[q], v[q], delta_t[q], spring);
+    }
+    for (int q = 0; q < block; ++q) {
+      const PairGroup& p = group(q);
+      const Geometry<P>& at = geometry[q];
+      Spring<P> spring = recalled<L, account, P>(list, place(q));
+      const Action<P> a = act<L, account>(law, dt, at, v_c(q), v[q], delta_t[q], grips[q], spring);
+      remember<L, account>(spring, list, place(q));
+      scatter<L, shares>(&p.i[lane(q)], &p.target[lane(q)], at, a, load, slot);
+    }
+  }
+}
+
+template <class L, Account account, class P>
+void pair_forces(Bed& bed, Chunk& chunk, const ChunkStep& at) {
+  list_forces<L, account, Shares::in_place, P>(bed, chunk.near[0], at.dt, at.load);
+  list_forces<L, account, Shares::to_slots, P>(bed, chunk.near[1], at.dt, at.load);
+}
+
+}  // namespace moraine::dem::cpu
