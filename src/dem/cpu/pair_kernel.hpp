@@ -13,7 +13,7 @@
 
 namespace moraine::dem::cpu {
 
-constexpr int block_pairs = 16;  // that go through the phases together
+constexpr int block_pairs = 64;  // that go through the phases together
 
 // Where j's share of a pair goes.
 enum class Shares { in_place, to_slots };
