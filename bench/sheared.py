@@ -28,6 +28,7 @@ scenes = ("undamped", "damped", "packing")
 normal_stress = 1e4  # Pa
 gamma_n = {"undamped": 0.0, "damped": 100.0, "packing": 100.0}  # N s/m
 settling = 0.01      # s, a tiled bed shears before it is kept
+fast_f = 0.15        # with preset `fast`: its own f is beyond what water bears among grains as large as these
 
 
 def tile(source, target, copies, grains=None):
@@ -139,6 +140,27 @@ snapshot_interval = {settling}
 name = "shear"
 strain = 0
 duration = {settling}
+zero_kinematics = false
+""", run=True)
+
+    def fast(self):
+        """As `sheared`, but the bed has gone on with preset `fast`, dry and undamped, and lies as soft springs let it."""
+        self.sheared()
+        return self._case("fast-1x1", f"""\
+extends = "../sheared-1x1"
+start = "../sheared-1x1"
+stages = ["shear"]
+[contact]
+gamma_n = 0
+[model]
+preset = "fast"
+f = {fast_f}
+[output]
+snapshot_interval = 1
+[[stage]]
+name = "shear"
+strain = 0
+duration = 0.4
 zero_kinematics = false
 """, run=True)
 
