@@ -20,7 +20,7 @@ namespace moraine::dem::cpu {
 // A pair within the neighbour margin, from which near pairs are drawn.
 struct Candidate {
   Index i, j;
-  Index link;   // for pairs across chunks
+  Index link;   // for pairs across chunks: which of the chunk's
   Index place;  // in the near list, or not_near
 };
 constexpr Index not_near = -1, no_link = -1;
@@ -38,6 +38,11 @@ struct Link {
   Index first, used = 0, size = 0;  // in slots
 };
 
+// What a chunk's search finds of one.
+struct Outgoing {
+  Index to, size;
+};
+
 struct alignas(64) Chunk {
   Index number, begin, end;
   int owner = 0;
@@ -48,7 +53,8 @@ struct alignas(64) Chunk {
   int steps_near = 0;             // since they were drawn
   std::vector<PlanePair> planes;  // within the neighbour margin, sorted by grain, then plane
   std::vector<Index> incoming;    // links, by the chunk they come from
-  std::vector<Index> outgoing;
+  Index first_link = 0;           // its own links are this one and the next ones,
+  std::vector<Outgoing> outgoing;
   std::array<std::vector<Index>, most_servos> members;  // its grains in each servo's layer
   Index lost = -1;                                      // a grain that went wrong
 
@@ -68,7 +74,7 @@ struct Bed {
   Sides sides;
   Uses uses;
   Index n = 0;
-  double r_max = 0, margin = 0;  // m
+  double r_max = 0, margin = 0;  // m; of the candidates
   ContactOrder order{1};
   std::vector<Chunk> chunks;
   std::vector<Link> links;

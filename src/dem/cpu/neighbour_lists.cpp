@@ -31,11 +31,55 @@ class OldPlaces {
   std::size_t next_ = 0;
 };
 
-void lay_out_slots(Bed& bed) {
+template <class Work>
+void for_each_chunk(const Host& space, Bed& bed, Work&& work) {
+  run_team(space.threads, [&](int thread) {
+    for (Chunk& chunk : bed.chunks)
+      if (chunk.owner == thread) work(chunk);
+  });
+}
+
+// Candidates of one chunk, by (i, j), and how many go to each later chunk.
+void find_pairs(Bed& bed, Chunk& chunk, const CloseGrains& grains) {
+  OldPlaces inside(std::exchange(chunk.candidates[0], {})), across(std::exchange(chunk.candidates[1], {}));
+  const auto is_rigid = [&](Index i) { return bed.scene.is_rigid(bed.part_of.data()[i]); };
+  chunk.outgoing.clear();
+  std::vector<Index> found;
+  for (Index i = chunk.begin; i < chunk.end; ++i) {
+    const GrainRow& g = bed.grain.data()[i];
+    const bool rigid = is_rigid(i);
+    found.clear();
+    grains.around(g.x, g.r, bed.margin, 0, [&](Index k, double, double) {
+      const Index j = grains.grain(k);
+      if (j > i && !(rigid && is_rigid(j))) found.push_back(j);
+    });
+    std::sort(found.begin(), found.end());
+    for (const Index j : found) {
+      if (j < chunk.end) {
+        chunk.candidates[0].push_back({i, j, no_link, inside.of(i, j)});
+        continue;
+      }
+      const Index to = bed.order.chunk_of(j);
+      auto link = std::ranges::find(chunk.outgoing, to, &Outgoing::to);
+      if (link == chunk.outgoing.end()) link = chunk.outgoing.insert(link, {to, 0});
+      ++link->size;
+      chunk.candidates[1].push_back(
+          {i, j, static_cast<Index>(link - chunk.outgoing.begin()), across.of(i, j)});
+    }
+  }
+}
+
+void lay_out_links(Bed& bed) {
   std::int64_t slots = 1;  // the first one is for pads
-  for (Link& link : bed.links) {
-    link.first = static_cast<Index>(slots);
-    slots += link.size;
+  bed.links.clear();
+  for (Chunk& chunk : bed.chunks) chunk.incoming.clear();
+  for (Chunk& chunk : bed.chunks) {
+    chunk.first_link = static_cast<Index>(bed.links.size());
+    for (const Outgoing& out : chunk.outgoing) {
+      bed.chunks[out.to].incoming.push_back(static_cast<Index>(bed.links.size()));
+      bed.links.push_back({chunk.number, out.to, static_cast<Index>(slots), 0, out.size});
+      slots += out.size;
+    }
   }
   if (std::max<std::int64_t>(bed.n + 1, slots) * row_bytes > std::numeric_limits<Offset>::max())
     throw error("too many grains for one process: ", bed.n, " grains and ", slots,
@@ -74,7 +118,7 @@ void draw_pairs(Bed& bed, Chunk& chunk, int part) {
       }
       Index target = q.j;
       if (q.link != no_link) {
-        Link& link = bed.links[q.link];
+        Link& link = bed.links[chunk.first_link + q.link];
         target = link.first + link.used++;
         bed.slot_owner.data()[target] = q.j;
       }
@@ -103,6 +147,12 @@ void find_plane_pairs(Bed& bed, Chunk& chunk, const BodyMotion& bodies) {
   chunk.planes = std::move(pairs);
 }
 
+void draw_near_pairs(Bed& bed, Chunk& chunk) {
+  chunk.steps_near = 0;
+  for (std::size_t l = 0; l < chunk.outgoing.size(); ++l) bed.links[chunk.first_link + l].used = 0;
+  for (int part = 0; part < 2; ++part) draw_pairs(bed, chunk, part);
+}
+
 // Whether one of the pairs touches, or is as near as rounding.
 bool any_touches(const Bed& bed, const WatchList& watched) {
   const Rows rows(bed.grain);
@@ -124,42 +174,14 @@ bool any_touches(const Bed& bed, const WatchList& watched) {
 
 }  // namespace
 
-void find_candidates(const Host& space, Bed& bed, Neighbours<Host>& neighbours, const BodyMotion& bodies) {
-  neighbours.build(space, bed.scene, bed.grain.data(), bed.part_of.data(), bed.n, bed.r_max, bed.margin,
-                   /*half=*/true);
-  std::vector<Index> link_of(bed.chunks.size(), no_link);  // from the chunk at hand to each other
-  bed.links.clear();
-  for (Chunk& chunk : bed.chunks) chunk.incoming.clear(), chunk.outgoing.clear();
-  for (Chunk& chunk : bed.chunks) {
-    OldPlaces inside(std::exchange(chunk.candidates[0], {})), across(std::exchange(chunk.candidates[1], {}));
-    for (Index i = chunk.begin; i < chunk.end; ++i) {
-      for (std::int64_t k = neighbours.row.data()[i]; k < neighbours.row.data()[i + 1]; ++k) {
-        const Index j = neighbours.neighbour.data()[k];
-        if (j < chunk.end) {
-          chunk.candidates[0].push_back({i, j, no_link, inside.of(i, j)});
-          continue;
-        }
-        const Index to = bed.order.chunk_of(j);
-        if (link_of[to] == no_link) {
-          link_of[to] = static_cast<Index>(bed.links.size());
-          bed.links.push_back({chunk.number, to, 0});
-          chunk.outgoing.push_back(link_of[to]);
-          bed.chunks[to].incoming.push_back(link_of[to]);
-        }
-        ++bed.links[link_of[to]].size;
-        chunk.candidates[1].push_back({i, j, link_of[to], across.of(i, j)});
-      }
-    }
-    for (const Index l : chunk.outgoing) link_of[bed.links[l].to] = no_link;
+void find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const BodyMotion& bodies) {
+  grains.sort(space, bed.scene, bed.grain.data(), bed.n, 2 * bed.r_max + bed.margin);
+  for_each_chunk(space, bed, [&](Chunk& chunk) {
+    find_pairs(bed, chunk, grains);
     find_plane_pairs(bed, chunk, bodies);
-  }
-  lay_out_slots(bed);
-}
-
-void draw_near_pairs(Bed& bed, Chunk& chunk) {
-  chunk.steps_near = 0;
-  for (const Index l : chunk.outgoing) bed.links[l].used = 0;
-  for (int part = 0; part < 2; ++part) draw_pairs(bed, chunk, part);
+  });
+  lay_out_links(bed);
+  for_each_chunk(space, bed, [&](Chunk& chunk) { draw_near_pairs(bed, chunk); });
 }
 
 void renew_near_pairs(Bed& bed, Chunk& chunk) {

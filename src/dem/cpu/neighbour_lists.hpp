@@ -8,21 +8,17 @@
 // When candidates run out: schedule.cpp, Worker::lists_last() sees it, the run ends, and pair_engine.cpp,
 // advance() searches.
 #pragma once
+#include "dem/close_grains.hpp"
 #include "dem/control.hpp"
 #include "dem/cpu/bed.hpp"
-#include "dem/neighbours.hpp"
 
 namespace moraine::dem::cpu {
 
-// Candidates of all chunks, links between chunks and their slots. Near lists keep their springs, but have no
-// places for them until they are drawn. Throws Error if a coordinate is not finite, or if there are too many
-// pairs.
-void find_candidates(const Host& space, Bed& bed, Neighbours<Host>& neighbours, const BodyMotion& bodies);
+// Candidates within bed.margin and near pairs of all chunks, links between chunks and their slots; springs
+// move along. Throws Error if a coordinate is not finite, or if there are too many pairs.
+void find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const BodyMotion& bodies);
 
-// Near pairs of one chunk; springs move along.
-void draw_near_pairs(Bed& bed, Chunk& chunk);
-
-// The same, if a pair that is only watched touches.
+// Draws near pairs of one chunk anew, if a pair that is only watched touches.
 void renew_near_pairs(Bed& bed, Chunk& chunk);
 
 }  // namespace moraine::dem::cpu

@@ -38,7 +38,7 @@ class PairEngine final : public Engine {
   Bed bed_;
   StepTasks tasks_;
   Control control_;
-  Neighbours<Host> neighbours_;
+  CloseGrains grains_;
   std::unique_ptr<Exchange> exchange_;
   std::unique_ptr<Schedule> schedule_;
   std::int64_t searches_ = 0;
@@ -81,13 +81,9 @@ void PairEngine::start(const Scene& scene) {
 }
 
 void PairEngine::search() {
-  find_candidates(space_, bed_, neighbours_, control_.bodies);
+  find_candidates(space_, bed_, grains_, control_.bodies);
   ++searches_;
   control_.moved = 0;
-  run_team(space_.threads, [&](int t) {
-    for (std::size_t c = t; c < bed_.chunks.size(); c += space_.threads)
-      draw_near_pairs(bed_, bed_.chunks[c]);
-  });
 }
 
 void PairEngine::advance(std::int64_t steps) {
@@ -125,8 +121,12 @@ State PairEngine::state() const {
 }
 
 Engine::Counts PairEngine::counts() const {
-  Counts c{.candidates = neighbours_.total, .rebuilds = searches_};
-  for (const Chunk& chunk : bed_.chunks) c.near += chunk.near[0].count + chunk.near[1].count;
+  Counts c{.rebuilds = searches_};
+  for (const Chunk& chunk : bed_.chunks)
+    for (int part = 0; part < 2; ++part) {
+      c.near += chunk.near[part].count;
+      c.candidates += static_cast<std::int64_t>(chunk.candidates[part].size());
+    }
   return c;
 }
 

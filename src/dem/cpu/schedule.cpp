@@ -71,7 +71,7 @@ class Worker {
 
   bool others_wait_for(const Chunk& c) const {
     return std::any_of(c.outgoing.begin(), c.outgoing.end(),
-                       [&](Index l) { return bed_.chunks[bed_.links[l].to].owner > thread_; });
+                       [&](const Outgoing& out) { return bed_.chunks[out.to].owner > thread_; });
   }
 
   // Grains and bodies to the next step, with the forces on them known; whether lists last there.

@@ -1,0 +1,68 @@
+// Grains by cells of a grid, side by side in memory, so that several are looked at at a time. For the host.
+#pragma once
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <optional>
+#include <vector>
+
+#include "backend/number.hpp"
+#include "dem/neighbours.hpp"
+
+namespace moraine::dem {
+
+class CloseGrains {
+ public:
+  // Sorts them into cells at least `reach` wide (m). Throws Error if a coordinate is not finite.
+  void sort(const Host& space, const Scene& scene, const GrainRow* grains, Index n, double reach) {
+    cells_ = neighbours_.sort_into_cells(space, scene, grains, n, reach);
+    n_ = n;
+    for (std::vector<double>* const list : {&x_, &y_, &z_, &r_})
+      list->resize(n + Pack::width);  // to a full pack
+    space.for_each(n, [&](std::int64_t k) {
+      const GrainRow& g = grains[cells_->order[k]];
+      x_[k] = g.x.x, y_[k] = g.x.y, z_[k] = g.x.z, r_[k] = g.r;
+    });
+  }
+  // The grain that has this number in the order of cells.
+  Index grain(Index k) const { return cells_->order[k]; }
+  Vec3d x(Index k) const { return {x_[k], y_[k], z_[k]}; }
+  double r(Index k) const { return r_[k]; }
+
+  // use(k, r + r_k + margin, square of the distance) for grains that are closer to x than that; k: their
+  // number in the order of cells, `from` or above. Asked with a reach that is at most that of the cells.
+  template <class Use>
+  void around(const Vec3d& x, double r, double margin, Index from, Use&& use) const {
+    const Vec3<Pack> at{Pack(x.x), Pack(x.y), Pack(x.z)};
+    const Pack r_and_margin(r + margin);
+    cells_->grid.runs_around(x, [&](std::int32_t first_cell, std::int32_t last_cell) {
+      Index low = n_, end = 0;
+      for (std::int32_t c = first_cell; c <= last_cell; ++c)
+        if (cells_->first[c] < cells_->end[c]) low = std::min(low, cells_->first[c]), end = cells_->end[c];
+      for (Index k = std::max(low, from); k < end; k += Pack::width) {
+        const Vec3<Pack> d =
+            nearest_image(cells_->grid.sides, at - Vec3<Pack>{load(x_, k), load(y_, k), load(z_, k)});
+        const Pack reach = r_and_margin + load(r_, k), distance2 = dot(d, d);
+        const unsigned in_run = (1u << std::min(end - k, Index{Pack::width})) - 1;
+        for (unsigned close = bits(distance2 < reach * reach) & in_run; close != 0; close &= close - 1) {
+          const int lane = std::countr_zero(close);
+          use(k + lane, reach[lane], distance2[lane]);
+        }
+      }
+    });
+  }
+
+ private:
+  static Pack load(const std::vector<double>& list, Index k) {
+    Pack p;
+    std::memcpy(&p.v, &list[k], sizeof p.v);
+    return p;
+  }
+
+  Neighbours<Host> neighbours_;
+  std::optional<Neighbours<Host>::Cells> cells_;
+  Index n_ = 0;
+  std::vector<double> x_, y_, z_, r_;  // m
+};
+
+}  // namespace moraine::dem
