@@ -13,7 +13,8 @@ namespace {
 
 // How long near pairs should last: drawing them costs as much as a step or two, but a wider margin has more
 // pairs that do not touch.
-constexpr int fewest_steps = 24, most_steps = 96;
+constexpr int steps_foreseen = 32;
+constexpr int fewest_steps = 16, most_steps = 64;
 constexpr double least_near_margin = 1e-6;  // of the largest radius
 
 // Places in the near list of the candidates there were, asked for by (i, j).
@@ -91,6 +92,7 @@ void lay_out_links(Bed& bed) {
 void draw_pairs(Bed& bed, Chunk& chunk, int part) {
   const GrainRow* const grain = bed.grain.data();
   const Line difference = i_minus_j();
+  const Pack foreseen(-steps_foreseen * bed.scene.dt);
   PairList& old = chunk.near[part];
   PairList& list = chunk.spare;
   WatchList& watched = chunk.watched[part];
@@ -106,7 +108,9 @@ void draw_pairs(Bed& bed, Chunk& chunk, int part) {
     }
     to_columns(lines, c);
     const Vec3<Pack> plain{c[0], c[1], c[2]}, d = nearest_image(bed.sides, plain), shift = d - plain;
-    const Pack reach = c[7] + Pack(chunk.near_margin);
+    // How far the two come closer while the list lasts, if they go on as they do.
+    const Pack closing = max(dot(Vec3<Pack>{c[4], c[5], c[6]}, d) * foreseen / c[7], Pack(0.0));
+    const Pack reach = c[7] + closing + Pack(chunk.near_margin);
     const Pack apart = dot(d, d) - reach * reach, across = dot(shift, shift);
     for (int k = 0; k < used; ++k) {
       Candidate& q = candidates[start + k];
