@@ -33,6 +33,7 @@ class Engine {
     std::int64_t candidates = 0;  // pairs within the neighbour margin
     std::int64_t near = 0;        // pairs evaluated at each step
     std::int64_t rebuilds = 0;    // of the candidates
+    double search_seconds = 0;    // that these took, where the engine times them
   };
   virtual Counts counts() const = 0;
   virtual std::string describe() const = 0;  // e.g. "cpu, 2 threads, AVX2"

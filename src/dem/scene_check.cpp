@@ -71,6 +71,16 @@ double neighbour_margin(const Scene& scene, const State& state) {
   return 0.05 * sum / state.size();
 }
 
+double widest_margin(const Scene& scene, const State& state) {
+  if (scene.neighbour_margin > 0) return scene.neighbour_margin;
+  double widest = 20 * neighbour_margin(scene, state);  // a mean radius
+  const double r_max = *std::max_element(state.r.begin(), state.r.end());
+  for (int a = 0; a < 3; ++a)
+    if (const double side = Sides::of(scene).side[a]; side > 0)
+      widest = std::min(widest, side / 2 - 2 * r_max);
+  return widest;
+}
+
 std::string triple(const Vec3d& a) {
   std::ostringstream text;
   text.precision(9);

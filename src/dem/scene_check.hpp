@@ -13,6 +13,7 @@ namespace moraine::dem {
 void check_scene(const Scene& scene, const State& state);
 
 double neighbour_margin(const Scene& scene, const State& state);  // m
+double widest_margin(const Scene& scene, const State& state);     // m, that an engine may choose instead
 
 // Where a grain is, for errors: "grain 5 at step 100 (t = 0.01 s) of stage fly, position (x, y, z) m,
 // velocity (x, y, z) m/s: ".

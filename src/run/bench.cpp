@@ -23,6 +23,7 @@ void bench_case(const Options& options, const std::string& stage_name, std::int6
   engine->load(stage.scene, now.state, water.get());
   steps = at_exchange(stage, steps);
   engine->advance(at_exchange(stage, std::min<std::int64_t>(100, steps)));  // warm caches and lists
+  const double searched = engine->counts().search_seconds;
   const auto began = std::chrono::steady_clock::now();
   engine->advance(steps);
   const double ms =
@@ -33,10 +34,11 @@ void bench_case(const Options& options, const std::string& stage_name, std::int6
       "{\"program\": \"moraine %s\", \"backend\": \"%s\", \"threads\": %d, \"stage\": \"%s\", \"steps\": "
       "%lld, "
       "\"grains\": %d, \"contacts\": %zu, \"pairs\": %lld, \"near_pairs\": %lld, \"ms_per_step\": %.6g, "
-      "\"particle_steps_per_s\": %.6g%s}\n",
+      "\"searches\": %lld, \"search_share\": %.3g, \"particle_steps_per_s\": %.6g%s}\n",
       MORAINE_VERSION, engine->describe().c_str(), engine->threads(), stage.name.c_str(),
       static_cast<long long>(steps), end.size(), end.contacts.size(),
       static_cast<long long>(counts.candidates), static_cast<long long>(counts.near), ms,
+      static_cast<long long>(counts.rebuilds), (counts.search_seconds - searched) / (1e-3 * ms * steps),
       end.size() / ms * 1e3, (water ? ", \"water\": \"" + water->solver() + "\"" : std::string()).c_str());
 }
 

@@ -55,6 +55,7 @@ void Bed::load_state(const Scene& s, const State& state, const BodyMotion& bodie
   n = state.size();
   r_max = *std::max_element(state.r.begin(), state.r.end());
   margin = neighbour_margin(s, state);
+  searched.resize(n);
   order = {chunk_size(n)};
 
   part_of.set(state.part_of);
@@ -97,6 +98,30 @@ Dissipation pending_dissipation(const Bed& bed) {
     });
   };
   return {sum(&LoadRow::slip), sum(&LoadRow::viscous)};
+}
+
+void measure_ways(const Bed& bed, Chunk& chunk, std::int64_t step) {
+  double first = 0, second = 0;
+  for (Index i = chunk.begin; i < chunk.end; ++i) {
+    const Vec3d way = bed.grain.data()[i].x - bed.searched.data()[i].x;
+    const double way2 = dot(way, way);
+    second = std::max(second, std::min(first, way2)), first = std::max(first, way2);
+  }
+  chunk.at(step).ways2[0] = first, chunk.at(step).ways2[1] = second;
+}
+
+double approach_since_search(const Bed& bed, const BodyMotion& bodies) {
+  double first = 0, second = 0;
+  const auto count = [&](double way2) {
+    second = std::max(second, std::min(first, way2)), first = std::max(first, way2);
+  };
+  for (const Chunk& chunk : bed.chunks)
+    for (const double way2 : chunk.at(bodies.step - 1).ways2) count(way2);
+  for (int k = 0; k < bodies.planes; ++k) {
+    const double way = bodies.plane[k].place - bed.plane_searched[k];
+    count(way * way);
+  }
+  return (1 + 1e-9) * (std::sqrt(first) + std::sqrt(second));
 }
 
 double fastest(const Bed& bed, const BodyMotion& bodies) {

@@ -32,6 +32,12 @@ struct PlanePair {
   bool touched = true;  // at the step before; true also where that is not known
 };
 
+// A vector in a row of its own.
+struct alignas(32) WayRow {
+  Vec3d x;  // m
+  double unused;
+};
+
 // Slots for the pairs from one chunk to another.
 struct Link {
   Index from, to;
@@ -50,7 +56,9 @@ struct alignas(64) Chunk {
   PairList near[2], spare;
   WatchList watched[2];           // candidates that are not near
   double near_margin;             // m, of the near pairs
+  double near_until = 0;          // m, Control::moved up to which no pair can touch that is not even watched
   int steps_near = 0;             // since they were drawn
+  std::int64_t times_drawn = 0;   // since the search
   std::vector<PlanePair> planes;  // within the neighbour margin, sorted by grain, then plane
   std::vector<Index> incoming;    // links, by the chunk they come from
   Index first_link = 0;           // its own links are this one and the next ones,
@@ -64,6 +72,7 @@ struct alignas(64) Chunk {
     Reaction reaction;
     Dissipation lost;                // in the step
     double fastest2[3] = {0, 0, 0};  // largest v^2 by component
+    double ways2[2] = {0, 0};        // the two largest squares of ways since the search, where measured
   } tally[2];
   const Tally& at(std::int64_t step) const { return tally[step & 1]; }
   Tally& at(std::int64_t step) { return tally[step & 1]; }
@@ -79,9 +88,11 @@ struct Bed {
   std::vector<Chunk> chunks;
   std::vector<Link> links;
   Host::Array<BodyId> part_of;
-  Host::Array<GrainRow> grain;  // n grains, then one that never touches
-  Host::Array<LoadRow> load;    // of the last step of advance()
-  Host::Array<LoadRow> slot;    // the first one is for lanes without a pair
+  Host::Array<GrainRow> grain;   // n grains, then one that never touches
+  Host::Array<WayRow> searched;  // where grains were at the last search
+  double plane_searched[most_planes];
+  Host::Array<LoadRow> load;  // of the last step of advance()
+  Host::Array<LoadRow> slot;  // the first one is for lanes without a pair
   Host::Array<Index> slot_owner;
   Host::Array<WaterRow> water;  // with pore water only: at the last exchange, for state()
 
@@ -95,6 +106,10 @@ Dissipation sum_dissipation(const Bed& bed, std::int64_t step);
 // Of the present step, which the motion will add up only when it comes to it; the same sums in the same
 // order.
 Dissipation pending_dissipation(const Bed& bed);
+// What each chunk's grains have moved since the search, into its tally of the step; and from these a bound,
+// m, on how far any two bodies have come closer to each other.
+void measure_ways(const Bed& bed, Chunk& chunk, std::int64_t step);
+double approach_since_search(const Bed& bed, const BodyMotion& bodies);
 // A bound on the speed of anything, m/s.
 double fastest(const Bed& bed, const BodyMotion& bodies);
 

@@ -1,6 +1,7 @@
 #include "dem/cpu/neighbour_lists.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <limits>
 #include <tuple>
 
@@ -89,7 +90,8 @@ void lay_out_links(Bed& bed) {
   clear(bed.slot);
 }
 
-void draw_pairs(Bed& bed, Chunk& chunk, int part) {
+// far: m, gaps from which on pairs are not watched either.
+void draw_pairs(Bed& bed, Chunk& chunk, int part, double far) {
   const GrainRow* const grain = bed.grain.data();
   const Line difference = i_minus_j();
   const Pack foreseen(-steps_foreseen * bed.scene.dt);
@@ -111,13 +113,14 @@ void draw_pairs(Bed& bed, Chunk& chunk, int part) {
     // How far the two come closer while the list lasts, if they go on as they do.
     const Pack closing = max(dot(Vec3<Pack>{c[4], c[5], c[6]}, d) * foreseen / c[7], Pack(0.0));
     const Pack reach = c[7] + closing + Pack(chunk.near_margin);
-    const Pack apart = dot(d, d) - reach * reach, across = dot(shift, shift);
+    const Pack distance2 = dot(d, d), across = dot(shift, shift), sight = c[7] + Pack(far);
+    const Pack apart = distance2 - reach * reach, beyond = distance2 - sight * sight;
     for (int k = 0; k < used; ++k) {
       Candidate& q = candidates[start + k];
       // One that has just opened, however far, still gives up what its spring held.
       if (!(apart[k] < 0 || (q.place != not_near && old.remembers(q.place)))) {
         q.place = not_near;
-        watched.add(q.i, q.j, across[k] > 0);
+        if (beyond[k] < 0) watched.add(q.i, q.j, across[k] > 0);
         continue;
       }
       Index target = q.j;
@@ -151,10 +154,12 @@ void find_plane_pairs(Bed& bed, Chunk& chunk, const BodyMotion& bodies) {
   chunk.planes = std::move(pairs);
 }
 
-void draw_near_pairs(Bed& bed, Chunk& chunk) {
-  chunk.steps_near = 0;
+void draw_near_pairs(Bed& bed, Chunk& chunk, const Closing& closing) {
+  const double far = std::max(most_steps * closing.in_step, least_near_margin * bed.r_max);
+  chunk.near_until = closing.so_far + far;
+  chunk.steps_near = 0, ++chunk.times_drawn;
   for (std::size_t l = 0; l < chunk.outgoing.size(); ++l) bed.links[chunk.first_link + l].used = 0;
-  for (int part = 0; part < 2; ++part) draw_pairs(bed, chunk, part);
+  for (int part = 0; part < 2; ++part) draw_pairs(bed, chunk, part, far);
 }
 
 // Whether one of the pairs touches, or is as near as rounding.
@@ -178,23 +183,34 @@ bool any_touches(const Bed& bed, const WatchList& watched) {
 
 }  // namespace
 
-void find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const BodyMotion& bodies) {
+double find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const BodyMotion& bodies) {
   grains.sort(space, bed.scene, bed.grain.data(), bed.n, 2 * bed.r_max + bed.margin);
   for_each_chunk(space, bed, [&](Chunk& chunk) {
     find_pairs(bed, chunk, grains);
     find_plane_pairs(bed, chunk, bodies);
+    for (Index i = chunk.begin; i < chunk.end; ++i) bed.searched.data()[i].x = bed.grain.data()[i].x;
   });
+  for (int k = 0; k < bodies.planes; ++k) bed.plane_searched[k] = bodies.plane[k].place;
   lay_out_links(bed);
-  for_each_chunk(space, bed, [&](Chunk& chunk) { draw_near_pairs(bed, chunk); });
+  const auto began = std::chrono::steady_clock::now();
+  const Closing closing{0, 2 * fastest(bed, bodies) * bed.scene.dt};
+  for_each_chunk(space, bed, [&](Chunk& chunk) {
+    draw_near_pairs(bed, chunk, closing);
+    chunk.times_drawn = 0;
+  });
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
 }
 
-void renew_near_pairs(Bed& bed, Chunk& chunk) {
+void renew_near_pairs(Bed& bed, Chunk& chunk, const Closing& closing) {
   ++chunk.steps_near;
-  if (!any_touches(bed, chunk.watched[0]) && !any_touches(bed, chunk.watched[1])) return;
-  if (chunk.steps_near < fewest_steps) chunk.near_margin = std::min(1.5 * chunk.near_margin, bed.margin);
-  if (chunk.steps_near > most_steps)
+  if (any_touches(bed, chunk.watched[0]) || any_touches(bed, chunk.watched[1])) {
+    if (chunk.steps_near < fewest_steps) chunk.near_margin = std::min(1.5 * chunk.near_margin, bed.margin);
+  } else if (closing.so_far >= chunk.near_until) {
     chunk.near_margin = std::max(0.75 * chunk.near_margin, least_near_margin * bed.r_max);
-  draw_near_pairs(bed, chunk);
+  } else {
+    return;
+  }
+  draw_near_pairs(bed, chunk, closing);
 }
 
 }  // namespace moraine::dem::cpu

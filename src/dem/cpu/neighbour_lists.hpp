@@ -1,9 +1,9 @@
-// Two lists, the second drawn from the first: candidates within the neighbour margin (found by cells, every
-// few thousand steps), and of these the near pairs, whose forces are computed. All other candidates are
-// watched: each step looks whether one of them touches, which costs a tenth of computing its force, and then
-// the chunk draws its near pairs anew. So near pairs need no margin for how far grains may move, only enough
-// of one that they are not drawn at every step. When a list is renewed changes no bit: pairs that do not
-// touch add exact zeros.
+// Three lists. Candidates are within the neighbour margin, found by cells every few thousand steps. Of these
+// the near pairs are drawn every few dozen steps; their forces are computed. The ones that are further apart
+// are watched: each step looks whether one of them touches, which costs a tenth of computing its force, and
+// then the chunk draws anew. So near pairs are those that touch or soon will, however fast some grain flies
+// elsewhere. Candidates so far apart that nothing is fast enough to bring them together before the next draw
+// are not even watched. When a list is renewed changes no bit: pairs that do not touch add exact zeros.
 //
 // When candidates run out: schedule.cpp, Worker::lists_last() sees it, the run ends, and pair_engine.cpp,
 // advance() searches.
@@ -14,11 +14,17 @@
 
 namespace moraine::dem::cpu {
 
-// Candidates within bed.margin and near pairs of all chunks, links between chunks and their slots; springs
-// move along. Throws Error if a coordinate is not finite, or if there are too many pairs.
-void find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const BodyMotion& bodies);
+// Bounds on how far any two bodies have come closer since the search, and do so in a step, m.
+struct Closing {
+  double so_far, in_step;
+};
 
-// Draws near pairs of one chunk anew, if a pair that is only watched touches.
-void renew_near_pairs(Bed& bed, Chunk& chunk);
+// Candidates within bed.margin and near pairs of all chunks, links between chunks and their slots; springs
+// move along. Returns how long drawing the near pairs took, s. Throws Error if a coordinate is not finite, or
+// if there are too many pairs.
+double find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const BodyMotion& bodies);
+
+// Draws near pairs of one chunk anew, if it is time.
+void renew_near_pairs(Bed& bed, Chunk& chunk, const Closing& closing);
 
 }  // namespace moraine::dem::cpu

@@ -6,11 +6,14 @@
 //   water_exchange.hpp   meeting the pore water
 //   schedule.hpp         which thread does what, when
 #include <algorithm>
+#include <chrono>
 #include <memory>
+#include <optional>
 
 #include "backend/team.hpp"
 #include "dem/cpu/neighbour_lists.hpp"
 #include "dem/cpu/schedule.hpp"
+#include "dem/cpu/search_margin.hpp"
 #include "dem/scene_check.hpp"
 #include "dem/state_rows.hpp"
 
@@ -41,6 +44,7 @@ class PairEngine final : public Engine {
   CloseGrains grains_;
   std::unique_ptr<Exchange> exchange_;
   std::unique_ptr<Schedule> schedule_;
+  std::optional<SearchMargin> margin_;
   std::int64_t searches_ = 0;
   State kept_;  // what no step changes: ids, x_start, bodies that do not move
 };
@@ -59,6 +63,8 @@ void PairEngine::load(const Scene& scene, const State& s, FluidCoupling* fluid) 
   tasks_ = tasks_for(scene);
   exchange_ = std::make_unique<Exchange>(bed_.uses.water ? fluid : nullptr, s.water);
   schedule_ = std::make_unique<Schedule>(bed_, space_.threads);
+  margin_.emplace(bed_.margin, scene.neighbour_margin > 0 ? bed_.margin : 0.2 * bed_.margin,
+                  std::max(bed_.margin, widest_margin(scene, s)));
   searches_ = 0;
   search();
   if (!s.staggered) start(scene);
@@ -81,7 +87,14 @@ void PairEngine::start(const Scene& scene) {
 }
 
 void PairEngine::search() {
-  find_candidates(space_, bed_, grains_, control_.bodies);
+  const auto began = std::chrono::steady_clock::now();
+  double times_drawn = 0;
+  for (const Chunk& chunk : bed_.chunks)
+    times_drawn += static_cast<double>(chunk.times_drawn) / static_cast<double>(bed_.chunks.size());
+  bed_.margin = margin_->margin();
+  const double drawing = find_candidates(space_, bed_, grains_, control_.bodies);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  margin_->searched(seconds, drawing, times_drawn);
   ++searches_;
   control_.moved = 0;
 }
@@ -121,7 +134,7 @@ State PairEngine::state() const {
 }
 
 Engine::Counts PairEngine::counts() const {
-  Counts c{.rebuilds = searches_};
+  Counts c{.rebuilds = searches_, .search_seconds = margin_->search_seconds()};
   for (const Chunk& chunk : bed_.chunks)
     for (int part = 0; part < 2; ++part) {
       c.near += chunk.near[part].count;

@@ -83,9 +83,8 @@ class Worker {
     }
     if (!grains_are_ahead_)
       for (Chunk* c : mine_)
-        tasks_.motion(bed_, *c,
-                      {control_.bodies, n, dt(), bed_.load.data(),
-                       exchanges(bed_.scene, n) ? bed_.water.data() : nullptr});
+        move(*c, {control_.bodies, n, dt(), bed_.load.data(),
+                  exchanges(bed_.scene, n) ? bed_.water.data() : nullptr});
     const bool check = left_ == 1 || left_ % steps_between_checks == 0;
     if (check)
       for (Chunk* c : mine_) find_lost(bed_, *c, control_.bodies);
@@ -99,17 +98,27 @@ class Worker {
       return Schedule::Pause::lost;
     return lists_last() ? Schedule::Pause::done : Schedule::Pause::search;
   }
+  void move(Chunk& c, const ChunkStep& at) {
+    tasks_.motion(bed_, c, at);
+    if (measures_) measure_ways(bed_, c, at.step);
+  }
   void move_bodies() {
     control_.water = exchange_.reaction();
     control_.close_and_advance(bed_.scene, sum_reactions(bed_, control_.bodies));
   }
 
   bool lists_last() {
-    const double speed = fastest(bed_, control_.bodies);
-    control_.moved += 2 * speed * dt();
+    closing_ = 2 * fastest(bed_, control_.bodies) * dt();
+    control_.moved += closing_;
+    if (measures_) {
+      control_.moved = std::min(control_.moved, approach_since_search(bed_, control_.bodies));
+      measured_late_ = control_.moved > 0.7 * bed_.margin;
+    }
+    // Before the bound runs out it is worth while to measure how far grains have really moved.
+    measures_ = !measured_late_ && control_.moved + 4 * closing_ >= bed_.margin;
     // One step must stay in hand: a contact that opens in this step still belongs in the near list, for
     // what its spring gives up.
-    control_.stale = !(control_.moved + 2 * speed * dt() < bed_.margin);
+    control_.stale = !(control_.moved + closing_ < bed_.margin);
     return !control_.stale;
   }
 
@@ -139,7 +148,7 @@ class Worker {
   void take_on(Chunk& c) {
     Schedule::Progress& progress = schedule_.progress_[c.number];
     if (!progress.take(step())) return;
-    renew_near_pairs(bed_, c);
+    renew_near_pairs(bed_, c, {control_.moved, closing_});
     // Loads that are asked for after this step go to their own place, all others to a buffer.
     const Waiting w{&c, grains_are_ahead_ ? buffers_.take(bed_.order.chunk) - c.begin : bed_.load.data()};
     for (const ChunkTask task : tasks_.at_once) task(bed_, c, {control_.bodies, step(), dt(), w.load});
@@ -171,7 +180,7 @@ class Worker {
       at.push = push;
     }
     if (!grains_are_ahead_) return;
-    tasks_.motion(bed_, c, at);
+    move(c, at);
     // While they are in cache; the pressure of this step is solved for.
     if (bed_.uses.water && exchanges(bed_.scene, step() + 1) && !exchange_.stale())
       exchange_.displace(bed_, c);
@@ -208,7 +217,9 @@ class Worker {
   const bool layer_by_stress_;
   Control control_;
   std::int64_t left_;
-  bool grains_are_ahead_ = false;  // they have moved on to the next step, bodies have not
+  double closing_ = 0;                             // m, of any two bodies in a step
+  bool measures_ = false, measured_late_ = false;  // how far grains have moved since the search
+  bool grains_are_ahead_ = false;                  // they have moved on to the next step, bodies have not
   std::vector<Chunk*> mine_;
   std::vector<Waiting> waiting_;
 };
