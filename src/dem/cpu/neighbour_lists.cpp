@@ -14,8 +14,8 @@ namespace {
 
 // How long near pairs should last: drawing them costs as much as a step or two, but a wider margin has more
 // pairs that do not touch.
-constexpr int steps_foreseen = 32;
-constexpr int fewest_steps = 16, most_steps = 64;
+constexpr int steps_foreseen = 48;
+constexpr int fewest_steps = 24, most_steps = 128;
 constexpr double least_near_margin = 1e-6;  // of the largest radius
 
 // Places in the near list of the candidates there were, asked for by (i, j).
@@ -114,13 +114,15 @@ void draw_pairs(Bed& bed, Chunk& chunk, int part, double far) {
     const Pack closing = max(dot(Vec3<Pack>{c[4], c[5], c[6]}, d) * foreseen / c[7], Pack(0.0));
     const Pack reach = c[7] + closing + Pack(chunk.near_margin);
     const Pack distance2 = dot(d, d), across = dot(shift, shift), sight = c[7] + Pack(far);
-    const Pack apart = distance2 - reach * reach, beyond = distance2 - sight * sight;
+    const unsigned near = bits(distance2 < reach * reach), seen = bits(distance2 < sight * sight);
+    const unsigned over = bits(across > Pack(0.0));
     for (int k = 0; k < used; ++k) {
       Candidate& q = candidates[start + k];
+      const bool across_sides = over >> k & 1;
       // One that has just opened, however far, still gives up what its spring held.
-      if (!(apart[k] < 0 || (q.place != not_near && old.remembers(q.place)))) {
+      if (!(near >> k & 1) && (q.place == not_near || !old.remembers(q.place))) {
         q.place = not_near;
-        if (beyond[k] < 0) watched.add(q.i, q.j, across[k] > 0);
+        if (seen >> k & 1) watched.add(q.i, q.j, across_sides);
         continue;
       }
       Index target = q.j;
@@ -130,7 +132,7 @@ void draw_pairs(Bed& bed, Chunk& chunk, int part, double far) {
         bed.slot_owner.data()[target] = q.j;
       }
       const Spring<double> spring = q.place == not_near ? Spring<double>{} : old.spring(q.place);
-      q.place = list.add(q.i, q.j, target, across[k] > 0, spring);
+      q.place = list.add(q.i, q.j, target, across_sides, spring);
     }
   }
   list.pad(chunk.begin, bed.n, part == 1 ? 0 : chunk.begin);
