@@ -39,6 +39,12 @@ Velocities at_step(const Scene& scene, const State& s) {
   return w;
 }
 
+// Whether contacts remember the force of their dampers at the state's step. Else it is worked out from the
+// velocities at the step, which the engine foresaw a little differently.
+bool dampers_are_known(const Scene& scene, const State& s, Material material) {
+  return s.staggered && scene.ledger && Viscosity::used(scene.with(material));
+}
+
 // Springs are left as they are, here and in for_each_contact. A plane that is gone bears nothing.
 std::vector<WallForce> wall_forces(const Scene& scene, const State& s, const Velocities& at) {
   std::vector<WallForce> out;
@@ -48,8 +54,11 @@ std::vector<WallForce> wall_forces(const Scene& scene, const State& s, const Vel
     if (!plane) continue;
     const GrainRow g = grain_at(s, w.i, at.v, at.omega);
     Spring<double> spring = w.spring;
-    const PlaneAction a = plane_action<GeneralLaw, Account::none>(scene, 0, *plane, g, spring);
-    out.push_back({w.i, w.wall, std::abs(a.f[plane->axis]), a.f, plane->gap(g.x, g.r)});
+    const Vec3d f =
+        dampers_are_known(scene, s, plane->material)
+            ? remembered_force<GeneralLaw>(scene.with(plane->material), plane->geometry(g.x, g.r), spring)
+            : plane_action<GeneralLaw, Account::none>(scene, 0, *plane, g, spring).f;
+    out.push_back({w.i, w.wall, std::abs(f[plane->axis]), f, plane->gap(g.x, g.r)});
   }
   return out;
 }
@@ -59,12 +68,16 @@ template <class Use>
 void for_each_contact(const Scene& scene, const State& s, Use&& use) {
   const Sides sides = Sides::of(scene);
   const Velocities at = at_step(scene, s);
+  const bool known = dampers_are_known(scene, s, Material::grain);
   for (const Contact& c : s.contacts) {
     const Vec3d x_ij = nearest_image(sides, s.x[c.i] - s.x[c.j]);
     const Geometry<double> g = between_grains(x_ij, s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]);
     const Motion<double> motion{at.v[c.i] - at.v[c.j], at.omega[c.i], at.omega[c.j]};
     Spring<double> spring = c.spring;
-    use(c, g, contact_law<GeneralLaw, Account::none>(scene.with(Material::grain), 0, g, motion, spring).f);
+    const ContactParameters& law = scene.with(Material::grain);
+    use(c, g,
+        known ? remembered_force<GeneralLaw>(law, g, spring)
+              : contact_law<GeneralLaw, Account::none>(law, 0, g, motion, spring).f);
   }
 }
 

@@ -279,7 +279,8 @@ TEST(ContactLaw, PlanesAreAlikeAlongEveryAxis) {
         .id = BodyId::x_low, .axis = axis, .facing = facing, .place = 0.5, .v = turned(plane_v)};
     Spring<double> spring;
     spring.delta_t = turned({1e-6, 2e-6, 0});
-    const GrainRow grain{turned({0.3, 0.4, 0.5 + facing * 0.99 * r}), r, turned(v), r, turned(omega), 0, {}, 0};
+    const GrainRow grain{
+        turned({0.3, 0.4, 0.5 + facing * 0.99 * r}), r, turned(v), r, turned(omega), 0, {}, 0};
     const auto a = plane_action<Viscous, energy>(s, 1e-5, plane, grain, spring);
     const auto back = [&](const Vec3d& b) {
       Vec3d out{};

@@ -68,8 +68,23 @@ void expect_all_pairs(const Case& c, std::uint64_t seed) {
     EXPECT_TRUE(found.insert({{std::min(i, j), std::max(i, j)}, overlap}).second)
         << i << ' ' << j << " twice";
   });
-  if (c.n >= 40) EXPECT_GT(touching.size(), 0u);
+  if (c.n >= 40) {
+    EXPECT_GT(touching.size(), 0u);
+  }
   EXPECT_EQ(found, touching);
+
+  CloseGrains close;
+  close.sort(Host{}, s, grains.data(), c.n, 2 * c.r_max + margin);
+  for (Index i = 0; i < c.n; ++i) {
+    std::vector<Index> expected, around;
+    for (Index j = 0; j < c.n; ++j)
+      if (length(nearest_image(sides, grains[i].x - grains[j].x)) < grains[i].r + grains[j].r + margin)
+        expected.push_back(j);
+    close.around(grains[i].x, grains[i].r, margin, 0,
+                 [&](Index k, double, double) { around.push_back(close.grain(k)); });
+    std::sort(around.begin(), around.end());
+    ASSERT_EQ(around, expected) << "grain " << i;
+  }
 }
 
 TEST(Neighbours, RefuseWhatIsNoPlace) {

@@ -79,7 +79,7 @@ struct Bed {
   State state;
 };
 // Three hundred soft grains of mixed size after so many steps under their weight; x and y are periodic.
-inline Bed bed_after(std::int64_t steps) {
+inline Bed bed_after(std::int64_t steps, double margin = 0) {
   Packing p;
   p.count = 300, p.columns_x = p.columns_y = 5;
   p.radius_mean = 0.01, p.radius_std = 0.0005, p.cell = 1.06, p.seed = 3;
@@ -88,6 +88,7 @@ inline Bed bed_after(std::int64_t steps) {
   s.box = {lattice.box_x, lattice.box_y, 1};
   s.contact.fill(LinearContact{1e5, 1e5, 20, 8, 0.5, 0.5});
   s.dt = 0.1 * std::sqrt(mass(s, 0.008) / s.with(Material::grain).k_n);
+  s.neighbour_margin = margin;
   State state = lattice.state;
   sort_spatially(s, state);
   const auto engine = make_engine(Backend::cpu, 1);
@@ -134,7 +135,8 @@ inline void put_side_walls(Scene& s, bool along_x = true, bool along_y = true) {
 }
 
 // Grains of 2 cm that have settled between four side walls, some 1.2 diameters apart for each column.
-inline Bed column_between_walls(Index count, int columns, double wall_mu, std::int64_t steps) {
+inline Bed column_between_walls(Index count, int columns, double wall_mu, std::int64_t steps,
+                                double margin = 0) {
   Packing p;
   p.count = count, p.columns_x = p.columns_y = columns;
   p.radius_mean = 0.01, p.radius_std = 0.0005, p.cell = 1.06, p.seed = 3;
@@ -146,6 +148,7 @@ inline Bed column_between_walls(Index count, int columns, double wall_mu, std::i
   s.contact.fill(LinearContact{1e5, 1e5, 20, 8, 0.5, 0.5});
   s.with(Material::wall).mu_s = s.with(Material::wall).mu_d = wall_mu;
   s.dt = 0.1 * std::sqrt(mass(s, 0.008) / s.with(Material::grain).k_n);
+  s.neighbour_margin = margin;
   sort_spatially(s, bed.state);
   bed.state = run(*make_engine(Backend::cpu, 1), s, bed.state, steps);
   synchronise(s, bed.state);

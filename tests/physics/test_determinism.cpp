@@ -54,6 +54,42 @@ TEST_P(Determinism, NeighbourMargin) {
 
 ON_EVERY_BACKEND(Determinism);
 
+// While grains fall, land and come to rest, lists run out in every way there is: by bounds on speeds, by how
+// far grains have moved, by pairs that touch. Without a margin of its own the scene has one that follows the
+// clock.
+TEST(Lists, OutlastAFall) {
+  for (const bool walls : {false, true}) {
+    const auto settled = [&](double margin) {
+      const double r = 0.01;
+      return walls ? column_between_walls(300, 5, 0.4, 12000, margin * r).state
+                   : bed_after(12000, margin * r).state;
+    };
+    const State usual = settled(0);
+    for (const double margin : {0.01, 0.05, 0.3}) {
+      SCOPED_TRACE(margin);
+      expect_same_bits(settled(margin), usual);
+    }
+  }
+}
+
+// Pairs four at a time and, where the processor has AVX-512, eight at a time.
+TEST(Lanes, FourOrEight) {
+  const auto name = [] {
+    const auto engine = make_engine(Backend::cpu, 1);
+    return engine->describe();
+  };
+  if (name().find("AVX-512") == std::string::npos) GTEST_SKIP() << "no AVX-512 here";
+  for (const NamedBed& scene : scenes()) {
+    SCOPED_TRACE(scene.name);
+    const State eight = run(*make_engine(Backend::cpu, 1), scene.bed.scene, scene.bed.state, steps);
+    ::setenv("MORAINE_SIMD", "avx2", 1);
+    EXPECT_EQ(name().find("AVX-512"), std::string::npos);
+    const State four = run(*make_engine(Backend::cpu, 1), scene.bed.scene, scene.bed.state, steps);
+    ::unsetenv("MORAINE_SIMD");
+    expect_same_bits(four, eight);
+  }
+}
+
 // The GPU's loop on several blocks, which wait for each other once a step. A small margin makes all of them
 // leave again and again for new neighbours.
 TEST(Blocks, OneTwoFour) {

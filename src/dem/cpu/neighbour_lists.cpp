@@ -185,7 +185,8 @@ bool any_touches(const Bed& bed, const WatchList& watched) {
 
 }  // namespace
 
-double find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const BodyMotion& bodies) {
+double find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const Control& control) {
+  const BodyMotion& bodies = control.bodies;
   grains.sort(space, bed.scene, bed.grain.data(), bed.n, 2 * bed.r_max + bed.margin);
   for_each_chunk(space, bed, [&](Chunk& chunk) {
     find_pairs(bed, chunk, grains);
@@ -195,7 +196,7 @@ double find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const B
   for (int k = 0; k < bodies.planes; ++k) bed.plane_searched[k] = bodies.plane[k].place;
   lay_out_links(bed);
   const auto began = std::chrono::steady_clock::now();
-  const Closing closing{0, 2 * fastest(bed, bodies) * bed.scene.dt};
+  const Closing closing{control.travelled, 2 * fastest(bed, bodies) * bed.scene.dt};
   for_each_chunk(space, bed, [&](Chunk& chunk) {
     draw_near_pairs(bed, chunk, closing);
     chunk.times_drawn = 0;

@@ -14,7 +14,7 @@
 
 namespace moraine::dem::cpu {
 
-// Bounds on how far any two bodies have come closer since the search, and do so in a step, m.
+// Bounds on how far any two bodies have come closer since the engine was loaded, and do so in a step, m.
 struct Closing {
   double so_far, in_step;
 };
@@ -22,7 +22,7 @@ struct Closing {
 // Candidates within bed.margin and near pairs of all chunks, links between chunks and their slots; springs
 // move along. Returns how long drawing the near pairs took, s. Throws Error if a coordinate is not finite, or
 // if there are too many pairs.
-double find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const BodyMotion& bodies);
+double find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const Control& control);
 
 // Draws near pairs of one chunk anew, if it is time.
 void renew_near_pairs(Bed& bed, Chunk& chunk, const Closing& closing);

@@ -92,7 +92,7 @@ void PairEngine::search() {
   for (const Chunk& chunk : bed_.chunks)
     times_drawn += static_cast<double>(chunk.times_drawn) / static_cast<double>(bed_.chunks.size());
   bed_.margin = margin_->margin();
-  const double drawing = find_candidates(space_, bed_, grains_, control_.bodies);
+  const double drawing = find_candidates(space_, bed_, grains_, control_);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   margin_->searched(seconds, drawing, times_drawn);
   ++searches_;
@@ -145,7 +145,7 @@ Engine::Counts PairEngine::counts() const {
 
 std::string PairEngine::describe() const {
 #if defined(__AVX2__)
-  const char* set = "AVX2";
+  const char* set = has_wide_lanes() ? "AVX-512" : "AVX2";
 #elif defined(__x86_64__)
   const char* set = "SSE2";
 #elif defined(__aarch64__)

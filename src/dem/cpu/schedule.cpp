@@ -109,7 +109,7 @@ class Worker {
 
   bool lists_last() {
     closing_ = 2 * fastest(bed_, control_.bodies) * dt();
-    control_.moved += closing_;
+    control_.moved += closing_, control_.travelled += closing_;
     if (measures_) {
       control_.moved = std::min(control_.moved, approach_since_search(bed_, control_.bodies));
       measured_late_ = control_.moved > 0.7 * bed_.margin;
@@ -148,7 +148,7 @@ class Worker {
   void take_on(Chunk& c) {
     Schedule::Progress& progress = schedule_.progress_[c.number];
     if (!progress.take(step())) return;
-    renew_near_pairs(bed_, c, {control_.moved, closing_});
+    renew_near_pairs(bed_, c, {control_.travelled, closing_});
     // Loads that are asked for after this step go to their own place, all others to a buffer.
     const Waiting w{&c, grains_are_ahead_ ? buffers_.take(bed_.order.chunk) - c.begin : bed_.load.data()};
     for (const ChunkTask task : tasks_.at_once) task(bed_, c, {control_.bodies, step(), dt(), w.load});

@@ -194,6 +194,13 @@ MORAINE_HD Action<T> act(const P& p, double dt, const Geometry<T>& g, const Vec3
   return a;
 }
 
+// The force of a contact that remembers what damping did at this very step (ViscousWork).
+template <class L, class P, class T, class Spring>
+MORAINE_HD Vec3<T> remembered_force(const P& p, const Geometry<T>& g, const Spring& spring) {
+  const T f_n = L::Normal::force(p, g) + L::more_normal(p, g);
+  return axpy(f_n, g.n, axpy(T(-p.k_t), spring.delta_t, spring.f_viscous));
+}
+
 // The whole law. dt = 0 evaluates the forces and leaves the spring as it is.
 template <class L, Account account, class P, class T, class Spring>
 MORAINE_HD Action<T> contact_law(const P& p, double dt, const Geometry<T>& g, const Motion<T>& before,
