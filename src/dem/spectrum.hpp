@@ -5,7 +5,7 @@
 //   arms of eq. 4) to K, gamma_n and gamma_t likewise to C. dt_c = 2/(c + sqrt(c^2 + w^2)),  w^2, c: largest
 //   eigenvalues of M^-1 K (rad2/s2) and M^-1 C (1/s)
 //
-// Viscous forces use a velocity foreseen from the last acceleration, so a mode with w, c obeys
+// Viscous forces use a velocity foreseen from the last two half steps, so a mode with w, c obeys
 // z (z-1)^2 + w^2 dt^2 z^2 + c dt (z-1)(3z-1)/2 = 0 for its growth z a step: stable as long as
 // w^2 dt^2 + 4 c dt < 4, leaving through z = -1. Taking both largest eigenvalues together makes dt_c a bound,
 // exact where one mode has both (gamma_n/k_n = gamma_t/k_t), 2/w without damping.

@@ -123,8 +123,8 @@ struct Squeeze {
   std::vector<double> z, down;
 
   explicit Squeeze(const WetBed& bed) {
-    constexpr int layers = 10;
-    const State after = at_rest(loaded(bed).scene, bed.state);
+    constexpr int layers = 20;
+    const State after = quite_at_rest(loaded(bed).scene, bed.state);
     const double height = bed.state.wall_z();
     z = {0}, down = {0};
     for (int layer = 0; layer < layers; ++layer) {
@@ -193,8 +193,10 @@ struct Layered {
   }
 };
 
-void expect_consolidation_of_a_packing(const WetBed& packing) {
-  const WetBed bed = loaded(packing);
+// Pressed at a hundred times the step, so that water lifts no grain off a neighbour that holds it.
+void expect_consolidation_of_a_packing(bool walled) {
+  const WetBed packing = without_loose_grains(make_bed(900, 5, 100 * step_of_stress, 0, walled)),
+               bed = loaded(packing);
   const Squeeze dry(packing);
   const double phi = mean_porosity(bed), height = dry.height();
   Water w = water_over(bed);
@@ -223,11 +225,9 @@ void expect_consolidation_of_a_packing(const WetBed& packing) {
   }
 }
 
-TEST(Terzaghi, ConsolidationOfARandomPacking) { expect_consolidation_of_a_packing(tall_bed()); }
+TEST(Terzaghi, ConsolidationOfARandomPacking) { expect_consolidation_of_a_packing(false); }
 
-TEST(Terzaghi, ConsolidationOfARandomPackingBetweenSideWalls) {
-  expect_consolidation_of_a_packing(make_bed(900, 5, 1e4, 0, true));
-}
+TEST(Terzaghi, ConsolidationOfARandomPackingBetweenSideWalls) { expect_consolidation_of_a_packing(true); }
 
 // 1/s, at which the mean pressure over a closed floor and under a drained top falls once it falls evenly.
 double rate_of_decay(WetRun&& run, double from, double to) {  // s
