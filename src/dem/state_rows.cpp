@@ -1,6 +1,7 @@
 #include "dem/state_rows.hpp"
 
 #include "dem/memory_order.hpp"
+#include "dem/uses.hpp"
 
 namespace moraine::dem {
 
@@ -37,6 +38,27 @@ void half_step_back(const Scene& scene, GrainRow& g, const LoadRow& whole) {
   const Mobility m = mobility(scene, g);
   g.v = axpy(-0.5 * scene.dt, m.acceleration(whole.f), g.v);
   g.omega = axpy(-0.5 * scene.dt, m.spin_acceleration(whole.torque), g.omega);
+}
+
+void remember_velocities(const Scene& scene, State& s) {
+  const Sides sides = Sides::of(scene);
+  const BodyMotion bodies = motion_of(scene, s);
+  with_laws(scene, [&]<class Row, Account>() {
+    const auto remember = [&]<class L>(L*, const Geometry<double>& g, const Motion<double>& m,
+                                       Spring<double>& spring) {
+      if constexpr (L::damps) spring.v_before = contact_velocity<L>(scene.dt, g, m);
+    };
+    for (Contact& c : s.contacts) {
+      const Vec3d x_ij = nearest_image(sides, s.x[c.i] - s.x[c.j]);
+      const Geometry<double> g = between_grains(x_ij, s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]);
+      remember(static_cast<typename Row::BetweenGrains*>(nullptr), g,
+               {s.v[c.i] - s.v[c.j], s.omega[c.i], s.omega[c.j]}, c.spring);
+    }
+    for (WallContact& c : s.wall_contacts)
+      if (const Plane* plane = bodies.find(c.wall))
+        remember(static_cast<typename Row::AtPlanes*>(nullptr), plane->geometry(s.x[c.i], s.r[c.i]),
+                 {s.v[c.i] - plane->v, s.omega[c.i], {0, 0, 0}}, c.spring);
+  });
 }
 
 void append_grain(State& s, const GrainRow& g, const LoadRow& load, BodyId part_of) {

@@ -20,6 +20,9 @@ void start_half_a_step_back(const Scene& scene, const Reaction& reaction, const 
                             BodyMotion& bodies);
 void half_step_back(const Scene& scene, GrainRow& grain, const LoadRow& whole);
 
+// What damped contacts remember of their velocities, from a staggered state that has just begun.
+void remember_velocities(const Scene& scene, State& s);
+
 void append_grain(State& s, const GrainRow& grain, const LoadRow& load, BodyId part_of);
 // Only if they touch.
 void append_contact(State& s, const Scene& scene, const Sides& sides, const GrainRow& a, const GrainRow& b,

@@ -55,7 +55,7 @@ class CheckpointFile : public testing::Test {
     return message([&] { read_checkpoint(path); });
   }
   // As if the file had been written with what now stands in it.
-  void reseal(std::int64_t format = 6) const {
+  void reseal(std::int64_t format = 7) const {
     std::string bytes = contents(path);
     seal(bytes, "checkpoint", format);
     directory.write("checkpoint.h5", bytes);
@@ -230,7 +230,7 @@ TEST_F(CheckpointFile, RefusesAnotherFormat) {
 // A checkpoint before it is no help where this version is the wrong one.
 TEST_F(CheckpointFile, CallsOnlyDamageDamage) {
   write_checkpoint(path, sample(2));
-  reseal(7);
+  reseal(8);
   try {
     read_checkpoint(path);
     FAIL();

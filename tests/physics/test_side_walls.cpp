@@ -133,15 +133,19 @@ TEST_P(SideWall, AndFloorBearTheWeight) {
   for (const double mu : {0.0, 0.4}) {
     const Bed bed = mu == 0 ? column_between_walls(300, 5, 0, 45000) : bed_that_sank();
     const Scene& s = bed.scene;
-    const State now = run(*engine, s, bed.state, 15000);
-    const Loads loads = loads_of(s, now);
-    const Borne b = borne(loads);
-    double weight = 0, mean_force = 0;
-    for (const double r : now.r) weight += mass(s, r) * s.gravity;
-    for (const ContactForce& c : loads.contacts) mean_force += length(c.f_n) / loads.contacts.size();
-    const double unbalanced = observe(s, now, loads).unbalanced_force;
-    const double bound = unbalanced * mean_force * now.size();
+    double weight = 0, bound = 0;
+    for (const double r : bed.state.r) weight += mass(s, r) * s.gravity;
+    State now = bed.state;
+    Loads loads;
+    for (int rests = 0; rests == 0 || (rests < 5 && bound > 0.02 * weight); ++rests) {  // until it is at rest
+      now = run(*engine, s, now, 15000);
+      loads = loads_of(s, now);
+      double mean_force = 0;
+      for (const ContactForce& c : loads.contacts) mean_force += length(c.f_n) / loads.contacts.size();
+      bound = observe(s, now, loads).unbalanced_force * mean_force * now.size();
+    }
     ASSERT_LT(bound, 0.02 * weight);
+    const Borne b = borne(loads);
     std::printf("mu %.1f: floor %.5f, side walls %.5f of the weight; bound %.1e\n", mu, b.floor / weight,
                 b.friction / weight, bound / weight);
     EXPECT_NEAR(b.floor + b.friction, weight, bound);

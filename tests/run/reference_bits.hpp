@@ -95,7 +95,7 @@ inline void feed_state(const output::Checkpoint& c, Digest& grains, Digest& cont
     water.feed(passed);
 
   const dem::Ledger& l = s.ledger;
-  for (const double joule : {l.slip, l.viscous, l.planes, l.layers, 0.0, l.water}) ledger.feed(joule);
+  for (const double joule : {l.slip, l.viscous, l.planes, l.layers, l.water}) ledger.feed(joule);
 }
 
 // Every dataset in the order of names: name, shape, numbers as they stand in the file.

@@ -67,7 +67,12 @@ void PairEngine::load(const Scene& scene, const State& s, FluidCoupling* fluid) 
                   std::max(bed_.margin, widest_margin(scene, s)));
   searches_ = 0;
   search();
-  if (!s.staggered) start(scene);
+  if (s.staggered) return;
+  start(scene);
+  if (!bed_.uses.damped) return;
+  State begun = state();
+  remember_velocities(scene, begun);
+  load(scene, begun, fluid);
 }
 
 // First forces, and velocities half a step back.

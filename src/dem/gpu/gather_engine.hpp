@@ -72,7 +72,12 @@ class GatherEngine final : public Engine {
     search(s.step);
     place_springs(s.contacts);
     refresh_view();
-    if (!s.staggered) start(control);
+    if (s.staggered) return;
+    start(control);
+    if (!uses_.damped) return;
+    State begun = state();
+    remember_velocities(scene, begun);
+    load(scene, begun, fluid);
   }
 
   void advance(std::int64_t steps) override {

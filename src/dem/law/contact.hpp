@@ -82,6 +82,15 @@ MORAINE_HD Slide<T> slide(double dt, const Geometry<T>& g, const Motion<T>& befo
   return {n_mid, cross_plus(n_mid, spin, before.v), T(0.5 * dt) * dot(g.n, before.omega_i + before.omega_j)};
 }
 
+// v_c of the step that led to g, m/s. Without friction spins are no matter.
+template <class L, class T>
+MORAINE_HD Vec3<T> contact_velocity(double dt, const Geometry<T>& g, const Motion<T>& before) {
+  if constexpr (L::rubs)
+    return slide(dt, g, before).v_c;
+  else
+    return before.v;
+}
+
 // Where a step puts a contact's spring if it does not slip. The old spring turns with the pair: about n, then
 // from the old tangent plane into the new one. Both keep its length to fourth order in the angle, so a
 // contact that is carried round for long loses nothing.
