@@ -57,6 +57,7 @@ struct alignas(64) Chunk {
   WatchList watched[2];           // candidates that are not near
   double near_margin;             // m, of the near pairs
   double near_until = 0;          // m, Control::travelled up to which no pair can touch that is not watched
+  double apart_until = 0;         // m, the same up to which no pair that is watched can touch
   int steps_near = 0;             // since they were drawn
   std::int64_t times_drawn = 0;   // since the search
   std::vector<PlanePair> planes;  // within the neighbour margin, sorted by grain, then plane

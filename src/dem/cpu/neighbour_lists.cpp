@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <limits>
 #include <tuple>
 
@@ -159,16 +160,16 @@ void find_plane_pairs(Bed& bed, Chunk& chunk, const BodyMotion& bodies) {
 void draw_near_pairs(Bed& bed, Chunk& chunk, const Closing& closing) {
   const double far = std::max(most_steps * closing.in_step, least_near_margin * bed.r_max);
   chunk.near_until = closing.so_far + far;
-  chunk.steps_near = 0, ++chunk.times_drawn;
+  chunk.apart_until = closing.so_far, chunk.steps_near = 0, ++chunk.times_drawn;
   for (std::size_t l = 0; l < chunk.outgoing.size(); ++l) bed.links[chunk.first_link + l].used = 0;
   for (int part = 0; part < 2; ++part) draw_pairs(bed, chunk, part, far);
 }
 
-// Whether one of the pairs touches, or is as near as rounding.
-bool any_touches(const Bed& bed, const WatchList& watched) {
+// A lower bound on the gaps of all pairs, m; not positive where one touches.
+double least_gap(const Bed& bed, const WatchList& watched) {
   const Rows rows(bed.grain);
   const Row difference(-1, -1, -1, 1), slack(1 + 1e-12);
-  Pack least(1.0);
+  Pack least(bed.r_max * bed.r_max);  // of d^2 - R^2 = gap (2 R + gap)
   for (std::size_t g = 0; g < watched.pairs.size(); ++g) {
     const WatchList::Group& p = watched.pairs[g];
     Row c[Pack::width];
@@ -180,7 +181,10 @@ bool any_touches(const Bed& bed, const WatchList& watched) {
     const Pack reach = slack * c[3];
     least = min(fnma(reach, reach, dot(d, d)), least);
   }
-  return bits(least < Pack(0.0)) != 0;
+  double l = least[0];
+  for (int k = 1; k < Pack::width; ++k) l = std::min(l, least[k]);
+  const double r2 = 2 * bed.r_max;
+  return l / (r2 + std::sqrt(r2 * r2 + std::max(l, 0.0)));
 }
 
 }  // namespace
@@ -206,11 +210,15 @@ double find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const C
 
 void renew_near_pairs(Bed& bed, Chunk& chunk, const Closing& closing) {
   ++chunk.steps_near;
-  if (any_touches(bed, chunk.watched[0]) || any_touches(bed, chunk.watched[1])) {
+  const bool due = closing.so_far >= chunk.near_until;
+  if (!due && closing.so_far < chunk.apart_until) return;
+  const double gap = std::min(least_gap(bed, chunk.watched[0]), least_gap(bed, chunk.watched[1]));
+  if (!(gap > 0)) {
     if (chunk.steps_near < fewest_steps) chunk.near_margin = std::min(1.5 * chunk.near_margin, bed.margin);
-  } else if (closing.so_far >= chunk.near_until) {
+  } else if (due) {
     chunk.near_margin = std::max(0.75 * chunk.near_margin, least_near_margin * bed.r_max);
   } else {
+    chunk.apart_until = closing.so_far + (1 - 1e-9) * gap;
     return;
   }
   draw_near_pairs(bed, chunk, closing);

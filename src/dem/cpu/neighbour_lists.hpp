@@ -1,9 +1,10 @@
 // Three lists. Candidates are within the neighbour margin, found by cells every few thousand steps. Of these
 // the near pairs are drawn every few dozen steps; their forces are computed. The ones that are further apart
-// are watched: each step looks whether one of them touches, which costs a tenth of computing its force, and
-// then the chunk draws anew. So near pairs are those that touch or soon will, however fast some grain flies
-// elsewhere. Candidates so far apart that nothing is fast enough to bring them together before the next draw
-// are not even watched. When a list is renewed changes no bit: pairs that do not touch add exact zeros.
+// are watched: their distances are looked at as often as they might touch, which costs a tenth of computing
+// their forces, and when one does the chunk draws anew. So near pairs are those that touch or soon will,
+// however fast some grain flies elsewhere. Candidates so far apart that nothing is fast enough to bring them
+// together before the next draw are not even watched. When a list is renewed changes no bit: pairs that do
+// not touch add exact zeros.
 //
 // When candidates run out: schedule.cpp, Worker::lists_last() sees it, the run ends, and pair_engine.cpp,
 // advance() searches.
