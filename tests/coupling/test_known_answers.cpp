@@ -259,17 +259,24 @@ TEST(Terzaghi, FewCellsEvenOutFasterByWhatIsStated) {
   }
 }
 
-// With the porosity as it is: the gap beside the walls must not pass for wide pores in cells that are high.
-TEST(Terzaghi, FewAndManyCellsAgreeOverARandomPacking) {
-  const WetBed bed = loaded(make_bed(1000, 8, 1e4));
-  const auto rate = [&](int cells) {
-    Water w = water_over(bed);
-    w.cells = {2, 2, cells}, w.k_c = 4e-12;
-    const double fall = rate_of_decay({bed, w, under_pressure(bed, w, step_of_stress)}, 0.1, 0.2);
-    std::printf("%d cells: %.4f 1/s\n", cells, fall);
-    return fall / (1 + error_of_few_cells(w));
-  };
-  EXPECT_NEAR(rate(3) / rate(12), 1, 0.05);
+// With the porosity as it is: the gap beside the walls must not pass for wide pores in cells that are high,
+// which made 3 cells 10 % too fast. The median of several packings, because water that lifts a grain out of
+// its place in one of them decides over its rate.
+TEST(Terzaghi, FewAndManyCellsAgreeOverRandomPackings) {
+  std::vector<double> ratios;
+  for (const int grains : {1000, 1001, 1002, 1003, 1004}) {
+    const WetBed bed = loaded(without_loose_grains(make_bed(grains, 8, 1e4)));
+    const auto rate = [&](int cells) {
+      Water w = water_over(bed);
+      w.cells = {2, 2, cells}, w.k_c = 4e-12;
+      const double fall = rate_of_decay({bed, w, under_pressure(bed, w, step_of_stress)}, 0.1, 0.2);
+      return fall / (1 + error_of_few_cells(w));
+    };
+    ratios.push_back(rate(3) / rate(12));
+    std::printf("%d grains: 3 cells %.4f of the rate with 12\n", grains, ratios.back());
+  }
+  std::sort(ratios.begin(), ratios.end());
+  EXPECT_NEAR(ratios[2], 1, 0.05);
 }
 
 TEST(UndrainedLoading, HasSkemptonsBOfARandomPacking) {
