@@ -71,6 +71,12 @@ void Bed::load_state(const Scene& s, const State& state, const BodyMotion& bodie
       {-987654321.12, -876543210.98, -765432109.87}, -1e9, {0, 0, 0}, -1e9, {0, 0, 0}, 0, {0, 0, 0}, 0};
 
   chunks = chunks_of(*this, state, bodies);
+  for (Chunk& chunk : chunks)
+    for (Index i = chunk.begin; i < chunk.end; ++i)
+      for (int a = 0; a < 3; ++a) {
+        double& fastest = chunk.at(bodies.step - 1).fastest2[a];
+        fastest = std::max(fastest, rows[i].v[a] * rows[i].v[a]);
+      }
   place_contacts(chunks, state.contacts);
   place_plane_contacts(*this, state.wall_contacts, bodies);
 }

@@ -36,7 +36,8 @@ class Worker {
         thread_(thread),
         layer_by_stress_(bed_.scene.body(BodyId::top_layer).x.kind == Drive::Kind::stress),
         control_(control),
-        left_(steps) {
+        left_(steps),
+        closing_(2 * fastest(bed_, control.bodies) * bed_.scene.dt) {
     for (Chunk& c : bed_.chunks)
       if (c.owner == thread) mine_.push_back(&c);
     std::stable_partition(mine_.begin(), mine_.end(), [&](const Chunk* c) { return others_wait_for(*c); });
@@ -217,7 +218,7 @@ class Worker {
   const bool layer_by_stress_;
   Control control_;
   std::int64_t left_;
-  double closing_ = 0;                             // m, of any two bodies in a step
+  double closing_;                                 // m, of any two bodies in a step
   bool measures_ = false, measured_late_ = false;  // how far grains have moved since the search
   bool grains_are_ahead_ = false;                  // they have moved on to the next step, bodies have not
   std::vector<Chunk*> mine_;
