@@ -7,9 +7,8 @@ namespace moraine::dem {
 
 struct Control {
   BodyMotion bodies;
-  double moved = 0;  // m, bound on the approach of any two bodies since the last search
-  double travelled =
-      0;  // m, the same since the engine was loaded, never measured; the CPU's near lists go by it
+  double moved = 0;      // m, bound on the approach of any two bodies since the last search
+  double travelled = 0;  // m, the same since then, never measured; the CPU's near lists go by it
   bool stale = false;   // the lists have run out, or a grain is lost: grains are at this step, forces are not
   bool closed = true;   // the account of the present step is in bodies.ledger already
   WaterReaction water;  // of the last exchange

@@ -109,7 +109,6 @@ struct Rows {
   const BodyId* part_of;
   const std::int32_t *order, *first, *end;
   double margin;
-  bool half;
   std::array<bool, body_ids> rigid{};  // pairs of such grains are left out
   ContactOrder sum_order;
   std::int64_t* count;                // pass 1
@@ -124,7 +123,7 @@ struct Rows {
     grid.around(a.x, [&](std::int32_t cell) {
       for (std::int32_t k = first[cell]; k < end[cell]; ++k) {
         const Index j = order[k];
-        if (j == i || (half && j < i)) continue;
+        if (j == i) continue;
         if (rigid[static_cast<int>(part_of[i])] && rigid[static_cast<int>(part_of[j])]) continue;
         const Vec3d d = nearest_image(grid.sides, a.x - grains[j].x);
         const double reach = a.r + grains[j].r + margin;
@@ -149,9 +148,9 @@ struct Neighbours {
   typename Space::template Array<Index> neighbour;
   std::int64_t total = 0;
 
-  // half: each pair once, in the row of its lower index. Throws Error if a coordinate is not finite.
+  // Throws Error if a coordinate is not finite.
   void build(const Space& space, const Scene& scene, const GrainRow* grains, const BodyId* part_of, Index n,
-             double r_max, double margin, bool half) {
+             double r_max, double margin) {
     const Cells cells = sort_into_cells(space, scene, grains, n, 2 * r_max + margin);
     count_.resize(n + 1), row.resize(n + 1);
     search::Rows rows{.grid = cells.grid,
@@ -161,7 +160,6 @@ struct Neighbours {
                       .first = cells.first,
                       .end = cells.end,
                       .margin = margin,
-                      .half = half,
                       .sum_order = {chunk_size(n)},
                       .count = count_.data()};
     for (int id = 0; id < body_ids; ++id) rows.rigid[id] = scene.is_rigid(static_cast<BodyId>(id));

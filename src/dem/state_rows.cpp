@@ -43,6 +43,7 @@ void half_step_back(const Scene& scene, GrainRow& g, const LoadRow& whole) {
 void remember_velocities(const Scene& scene, State& s) {
   const Sides sides = Sides::of(scene);
   const BodyMotion bodies = motion_of(scene, s);
+  const std::vector<GrainRow> row = grain_rows(scene, s);  // layers move as they are driven
   with_laws(scene, [&]<class Row, Account>() {
     const auto remember = [&]<class L>(L*, const Geometry<double>& g, const Motion<double>& m,
                                        Spring<double>& spring) {
@@ -52,12 +53,12 @@ void remember_velocities(const Scene& scene, State& s) {
       const Vec3d x_ij = nearest_image(sides, s.x[c.i] - s.x[c.j]);
       const Geometry<double> g = between_grains(x_ij, s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]);
       remember(static_cast<typename Row::BetweenGrains*>(nullptr), g,
-               {s.v[c.i] - s.v[c.j], s.omega[c.i], s.omega[c.j]}, c.spring);
+               {row[c.i].v - row[c.j].v, row[c.i].omega, row[c.j].omega}, c.spring);
     }
     for (WallContact& c : s.wall_contacts)
       if (const Plane* plane = bodies.find(c.wall))
         remember(static_cast<typename Row::AtPlanes*>(nullptr), plane->geometry(s.x[c.i], s.r[c.i]),
-                 {s.v[c.i] - plane->v, s.omega[c.i], {0, 0, 0}}, c.spring);
+                 {row[c.i].v - plane->v, row[c.i].omega, {0, 0, 0}}, c.spring);
   });
 }
 
@@ -72,9 +73,7 @@ void append_grain(State& s, const GrainRow& g, const LoadRow& load, BodyId part_
   s.part_of.push_back(part_of);
 }
 
-// What a contact remembers under this law, whatever an earlier stage has left: without friction there is no
-// spring, ...
-static Spring<double> remembered(const Scene& scene, Material material, Spring<double> s) {
+Spring<double> remembered(const Scene& scene, Material material, Spring<double> s) {
   const ContactParameters& p = scene.with(material);
   MoreParts::for_each_memory([&]<class Part>() {
     const bool kept = Part::keeps(p) && (scene.ledger || !std::is_same_v<Part, ViscousWork>);

@@ -23,6 +23,10 @@ void half_step_back(const Scene& scene, GrainRow& grain, const LoadRow& whole);
 // What damped contacts remember of their velocities, from a staggered state that has just begun.
 void remember_velocities(const Scene& scene, State& s);
 
+// What a contact remembers in this scene, whatever an earlier stage has left: without friction there is no
+// spring, without damping no velocity, ...
+Spring<double> remembered(const Scene& scene, Material material, Spring<double> spring);
+
 void append_grain(State& s, const GrainRow& grain, const LoadRow& load, BodyId part_of);
 // Only if they touch.
 void append_contact(State& s, const Scene& scene, const Sides& sides, const GrainRow& a, const GrainRow& b,

@@ -10,6 +10,7 @@ namespace {
 // grows with the margin.
 double settled(double search, double drawing, double first) {
   SearchMargin m(first, 1e-4, 1e-2);
+  m.searched(search, 0, 0);  // the one that begins
   for (int k = 0; k < 100; ++k) {
     const double draws = 1e5 * m.margin(), each = drawing * (1 + 1e3 * m.margin());
     m.searched(search + each, each, draws);

@@ -178,7 +178,9 @@ TEST_F(Sweep, ItsCasesRunOnTheirOwn) {
 TEST_F(Sweep, InterruptedAndResumed) {
   const fs::path small = make("small", small_case());
   const auto process = start(to_sweep(small, "normal_stress=1,2,3 kPa", {"--threads", "2"}));
-  std::this_thread::sleep_for(std::chrono::milliseconds(250));
+  const fs::path second = small / "sweep/normal_stress-2kPa/output/log.txt";
+  for (int k = 0; k < 10000 && !fs::exists(second); ++k)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
   process->send(SIGINT);
   ASSERT_EQ(process->wait(), 1) << "over too soon to be interrupted";
   const std::string said = contents(directory.path() / "err");

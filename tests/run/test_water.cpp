@@ -136,7 +136,8 @@ TEST_F(Water, SameBitsAfterAnyBreak) {
     auto words = to_run(cut);
     if (fs::exists(cut / "output")) words.push_back("--resume");
     const auto process = start(words);
-    std::this_thread::sleep_for(150ms + 37ms * breaks);
+    for (int k = 0; k < 500 && !fs::exists(checkpoint_of(cut)); ++k) std::this_thread::sleep_for(1ms);
+    std::this_thread::sleep_for(15ms + 17ms * breaks);
     process->send(breaks % 2 ? SIGKILL : SIGTERM);
     over = process->wait() == 0;
   }

@@ -28,13 +28,14 @@ std::vector<Chunk> chunks_of(const Bed& bed, const State& s, const BodyMotion& b
 }
 
 // As near pairs, from which the search takes their springs. Contacts are sorted.
-void place_contacts(std::vector<Chunk>& chunks, const std::vector<Contact>& contacts) {
+void place_contacts(Bed& bed, const std::vector<Contact>& contacts) {
   auto contact = contacts.begin();
-  for (Chunk& chunk : chunks)
+  for (Chunk& chunk : bed.chunks)
     for (; contact != contacts.end() && contact->i < chunk.end; ++contact) {
       const auto& [i, j, spring] = *contact;
       const int part = j < chunk.end ? 0 : 1;
-      const Index place = chunk.near[part].add(i, j, 0, false, spring);
+      const Index place =
+          chunk.near[part].add(i, j, 0, false, remembered(bed.scene, Material::grain, spring));
       chunk.candidates[part].push_back({i, j, no_link, place});
     }
 }
@@ -43,7 +44,8 @@ void place_plane_contacts(Bed& bed, const std::vector<WallContact>& contacts, co
   for (const WallContact& w : contacts)
     if (const Plane* plane = bodies.find(w.wall))
       bed.chunks[bed.order.chunk_of(w.i)].planes.push_back(
-          {w.i, static_cast<std::int32_t>(plane - bodies.plane), w.spring});
+          {w.i, static_cast<std::int32_t>(plane - bodies.plane),
+           remembered(bed.scene, plane->material, w.spring)});
   for (Chunk& chunk : bed.chunks)
     std::ranges::sort(chunk.planes, {}, [](const PlanePair& p) { return std::tuple(p.i, p.plane); });
 }
@@ -77,7 +79,7 @@ void Bed::load_state(const Scene& s, const State& state, const BodyMotion& bodie
         double& fastest = chunk.at(bodies.step - 1).fastest2[a];
         fastest = std::max(fastest, rows[i].v[a] * rows[i].v[a]);
       }
-  place_contacts(chunks, state.contacts);
+  place_contacts(*this, state.contacts);
   place_plane_contacts(*this, state.wall_contacts, bodies);
 }
 

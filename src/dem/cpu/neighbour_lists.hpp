@@ -15,7 +15,7 @@
 
 namespace moraine::dem::cpu {
 
-// Bounds on how far any two bodies have come closer since the engine was loaded, and do so in a step, m.
+// Bounds on how far any two bodies have come closer since the search, and do so in a step, m.
 struct Closing {
   double so_far, in_step;
 };

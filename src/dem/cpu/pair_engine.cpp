@@ -96,7 +96,10 @@ void PairEngine::search() {
   double times_drawn = 0;
   for (const Chunk& chunk : bed_.chunks)
     times_drawn += static_cast<double>(chunk.times_drawn) / static_cast<double>(bed_.chunks.size());
-  bed_.margin = margin_->margin();
+  // Never so narrow that grains cross it in a step or two: what has just opened must still be a candidate.
+  const double closing = 2 * fastest(bed_, control_.bodies) * bed_.scene.dt;
+  bed_.margin = std::min(std::max(margin_->margin(), 4 * closing), margin_->most());
+  control_.travelled = 0;
   const double drawing = find_candidates(space_, bed_, grains_, control_);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   margin_->searched(seconds, drawing, times_drawn);
@@ -139,7 +142,7 @@ State PairEngine::state() const {
 }
 
 Engine::Counts PairEngine::counts() const {
-  Counts c{.rebuilds = searches_, .search_seconds = margin_->search_seconds()};
+  Counts c{.rebuilds = searches_, .search_seconds = margin_ ? margin_->search_seconds() : 0};
   for (const Chunk& chunk : bed_.chunks)
     for (int part = 0; part < 2; ++part) {
       c.near += chunk.near[part].count;

@@ -14,8 +14,7 @@ struct Lines<Pack> {
     return Line::load(reinterpret_cast<const double*>(row));
   }
   static Line two_rows(const Vec3d* a, const Vec3d* b) { return {row(*a), row(*b)}; }
-  // j's line times this and i's line: x_ij, r_i - r_j, v_ij, r_i + r_j.
-  static Line i_minus_j() { return {-1.0, Row(-1, -1, -1, 1)}; }
+  static Line i_minus_j() { return cpu::i_minus_j(); }
   // What of a pair's line (force, slip, f_t x n, viscous) goes to its grains.
   static Line on_i(double l) { return {1.0, Row(l, l, l, 1)}; }
   static Line on_j(double l) { return {Row(-1, -1, -1, 0), Row(l, l, l, 0)}; }
@@ -25,7 +24,8 @@ bool has_wide_lanes() {
 #if defined(MORAINE_WIDE)
   const char* const wanted = std::getenv("MORAINE_SIMD");
   return (!wanted || std::string_view(wanted) != "avx2") && __builtin_cpu_supports("avx512f") &&
-         __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
+         __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
+         __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512cd");
 #else
   return false;
 #endif

@@ -1,6 +1,6 @@
 // The loop over near pairs, compiled for AVX-512. Nothing here but templates over Wide may be left as a
 // function of its own: the linker would take it for the one that runs on all processors
-// (tests/dem/wide_symbols tells).
+// (tests/dem/wide-symbols tells).
 #include "backend/wide.hpp"
 #include "dem/cpu/pair_kernel.hpp"
 

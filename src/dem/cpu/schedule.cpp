@@ -86,22 +86,21 @@ class Worker {
       for (Chunk* c : mine_)
         move(*c, {control_.bodies, n, dt(), bed_.load.data(),
                   exchanges(bed_.scene, n) ? bed_.water.data() : nullptr});
-    const bool check = left_ == 1 || left_ % steps_between_checks == 0;
-    if (check)
-      for (Chunk* c : mine_) find_lost(bed_, *c, control_.bodies);
     barrier_.wait();
     if (exchange_.has_failed(n)) return Schedule::Pause::failed;
 
     if (!layer_by_stress_) move_bodies();
     if (!control_.closed) control_.bodies.ledger.add(sum_dissipation(bed_, n));
     control_.closed = false;
-    if (check && std::ranges::any_of(bed_.chunks, [](const Chunk& c) { return c.lost >= 0; }))
+    if (looks_for_lost() && std::ranges::any_of(bed_.chunks, [](const Chunk& c) { return c.lost >= 0; }))
       return Schedule::Pause::lost;
     return lists_last() ? Schedule::Pause::done : Schedule::Pause::search;
   }
+  bool looks_for_lost() const { return left_ == 1 || left_ % steps_between_checks == 0; }
   void move(Chunk& c, const ChunkStep& at) {
     tasks_.motion(bed_, c, at);
     if (measures_) measure_ways(bed_, c, at.step);
+    if (looks_for_lost()) find_lost(bed_, c, control_.bodies);
   }
   void move_bodies() {
     control_.water = exchange_.reaction();

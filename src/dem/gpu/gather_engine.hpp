@@ -156,7 +156,8 @@ class GatherEngine final : public Engine {
     const auto planes = static_cast<std::size_t>(bodies.planes);
     std::vector<Spring<double>> springs(std::max<std::size_t>(planes * n_, 1));
     for (const WallContact& w : s.wall_contacts)
-      if (const Plane* plane = bodies.find(w.wall)) springs[planes * w.i + (plane - bodies.plane)] = w.spring;
+      if (const Plane* plane = bodies.find(w.wall))
+        springs[planes * w.i + (plane - bodies.plane)] = remembered(view_.scene, plane->material, w.spring);
     plane_spring_.set(springs);
     lost_.resize(view_.chunks());
   }
@@ -173,8 +174,7 @@ class GatherEngine final : public Engine {
   }
 
   void search(std::int64_t step) {
-    lists_.build(space_, view_.scene, grain_[step & 1].data(), part_of_.data(), n_, r_max_, view_.margin,
-                 /*half=*/false);
+    lists_.build(space_, view_.scene, grain_[step & 1].data(), part_of_.data(), n_, r_max_, view_.margin);
     ++searches_;
   }
 
@@ -195,7 +195,7 @@ class GatherEngine final : public Engine {
     for (const Contact& c : contacts)
       for (const auto& [i, j] : {std::pair{c.i, c.j}, std::pair{c.j, c.i}})
         for (std::int64_t k = row[i]; k < row[i + 1]; ++k)
-          if (neighbour[k] == j) springs[k] = c.spring;
+          if (neighbour[k] == j) springs[k] = remembered(view_.scene, Material::grain, c.spring);
     spring_.set(springs);
   }
 

@@ -195,7 +195,8 @@ MORAINE_HD Action<T> act(const P& p, double dt, const Geometry<T>& g, const Vec3
   if constexpr (L::damps) {
     spring.v_before = dt == 0 ? none : select(touching, v_c, none);
     if constexpr (ledger) {
-      f_viscous = select(touching, f_viscous, none);
+      // A law that damps where these parameters do not leaves what rounding does.
+      f_viscous = L::Damping::used(p) ? select(touching, f_viscous, none) : none;
       a.viscous = T(-0.5 * dt) * dot(spring.f_viscous + f_viscous, v_c);
       spring.f_viscous = f_viscous;
     }
@@ -210,7 +211,7 @@ MORAINE_HD Vec3<T> remembered_force(const P& p, const Geometry<T>& g, const Spri
   return axpy(f_n, g.n, axpy(T(-p.k_t), spring.delta_t, spring.f_viscous));
 }
 
-// The whole law. dt = 0 evaluates the forces and leaves the spring as it is.
+// The whole law. dt = 0 evaluates the forces: the tangential spring stays, and what dampers remember begins.
 template <class L, Account account, class P, class T, class Spring>
 MORAINE_HD Action<T> contact_law(const P& p, double dt, const Geometry<T>& g, const Motion<T>& before,
                                  Spring& spring) {

@@ -22,7 +22,7 @@ struct Viscosity {
       return std::tuple{Named{"gamma_n", &Parameters::gamma_n}, Named{"gamma_t", &Parameters::gamma_t}};
     }
   };
-  static bool used(const Parameters& p) { return p.gamma_n > 0 || p.gamma_t > 0; }
+  MORAINE_HD static bool used(const Parameters& p) { return p.gamma_n > 0 || p.gamma_t > 0; }
   static bool keeps(const Parameters& p) { return used(p); }
 
   template <class T>
