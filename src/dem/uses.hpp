@@ -8,42 +8,43 @@
 
 namespace moraine::dem {
 
-struct Uses {
-  bool friction = false;   // tangential springs and torques, between grains or at planes
+struct LawUses {
+  bool friction = false;   // tangential springs and torques
   bool softening = false;  // mu_d < mu_s
-  bool damped_grains = false;
-  bool damped = false;  // between grains or at planes
+  bool damping = false;
+  bool operator==(const LawUses&) const = default;
+};
+struct Uses {
+  LawUses grains, planes;
   bool ledger = false;
   bool water = false;
+  bool damping() const { return grains.damping || planes.damping; }
+  bool operator==(const Uses&) const = default;
 };
 
 // What its parameters ask for.
+inline LawUses asked_by(const ContactParameters& p) {
+  const bool friction = p.mu_s > 0 && (p.k_t > 0 || p.gamma_t > 0);
+  return {friction, friction && SofteningCoulomb::keeps(p), Viscosity::used(p)};
+}
 inline Uses asked_by(const Scene& s) {
-  const ContactParameters &grain = s.with(Material::grain), &wall = s.with(Material::wall);
-  const auto any = [&](auto test) { return test(grain) || (s.has_planes() && test(wall)); };
-  Uses u;
-  u.friction = any([](const ContactParameters& p) { return p.mu_s > 0 && (p.k_t > 0 || p.gamma_t > 0); });
-  u.softening = u.friction && any([](const ContactParameters& p) { return SofteningCoulomb::keeps(p); });
-  u.damped_grains = Viscosity::used(grain);
-  u.damped = any([](const ContactParameters& p) { return Viscosity::used(p); });
-  u.ledger = s.ledger;
-  u.water = s.exchange_interval > 0;
-  return u;
+  return {asked_by(s.with(Material::grain)), s.has_planes() ? asked_by(s.with(Material::wall)) : LawUses{},
+          s.ledger, s.exchange_interval > 0};
 }
 
 // Calls use.operator()<Row, account>() with the first row of CompiledLaws that has all the scene asks for.
 template <class Use>
 void with_laws(const Scene& s, Use&& use) {
   const Uses u = asked_by(s);
-  const auto covers = [&]<class L>(bool damped, Material with, L*) {
-    return L::rubs >= u.friction && L::softens >= u.softening && L::damps >= damped &&
+  const auto covers = [&]<class L>(const LawUses& asked, Material with, L*) {
+    return L::rubs >= asked.friction && L::softens >= asked.softening && L::damps >= asked.damping &&
            MoreParts::covered_by<L>(s.with(with));
   };
   const auto try_row = [&]<class Row>(Row*) {
     using Grains = typename Row::BetweenGrains;
     using Planes = typename Row::AtPlanes;
-    if (!covers(u.damped_grains, Material::grain, static_cast<Grains*>(nullptr)) ||
-        !covers(u.damped, Material::wall, static_cast<Planes*>(nullptr)))
+    if (!covers(u.grains, Material::grain, static_cast<Grains*>(nullptr)) ||
+        !covers(u.planes, Material::wall, static_cast<Planes*>(nullptr)))
       return false;
     if (u.ledger)
       use.template operator()<Row, Account::energy>();
@@ -71,8 +72,8 @@ inline Uses uses_of(const Scene& s) {
   with_laws(s, [&]<class Row, Account>() {
     using Grains = typename Row::BetweenGrains;
     using Planes = typename Row::AtPlanes;
-    u.friction = Grains::rubs || Planes::rubs, u.softening = Grains::softens || Planes::softens;
-    u.damped_grains = Grains::damps, u.damped = Grains::damps || Planes::damps;
+    u.grains = {Grains::rubs, Grains::softens, Grains::damps};
+    u.planes = {Planes::rubs, Planes::softens, Planes::damps};
   });
   return u;
 }

@@ -13,10 +13,25 @@ namespace moraine::dem::cpu {
 
 namespace {
 
+// Of the law between grains that the scene takes, as PairList has them.
+unsigned remembered_parts(const Scene& scene) {
+  unsigned parts = 0;
+  with_laws(scene, [&]<class Row, Account account>() {
+    unsigned bit = 1;
+    MoreParts::for_each_memory([&]<class Part>() {
+      if (Row::BetweenGrains::template remembers<Part, account>) parts |= bit;
+      bit <<= 1;
+    });
+  });
+  return parts;
+}
+
 std::vector<Chunk> chunks_of(const Bed& bed, const State& s, const BodyMotion& bodies) {
   std::vector<Chunk> chunks(chunk_count(bed.n));
+  const unsigned parts = remembered_parts(bed.scene);
   for (Index c = 0; c < static_cast<Index>(chunks.size()); ++c) {
     Chunk& chunk = chunks[c];
+    for (PairList* list : {&chunk.near[0], &chunk.near[1], &chunk.spare}) list->remembered = parts;
     chunk.number = c;
     chunk.near_margin = 1e-4 * bed.r_max;
     chunk.begin = bed.order.begin_of(c), chunk.end = std::min(bed.n, bed.order.begin_of(c + 1));

@@ -64,7 +64,7 @@ void move(Bed& bed, Chunk& chunk, const ChunkStep& at) {
 
 ChunkTask motion_for(const Scene& scene) {
   const Uses u = uses_of(scene);
-  if (u.damped && u.ledger)
+  if (u.damping() && u.ledger)
     return u.water ? move<Viscous::yes, Impulse::of_water> : move<Viscous::yes, Impulse::none>;
   return u.water ? move<Viscous::no, Impulse::of_water> : move<Viscous::no, Impulse::none>;
 }

@@ -69,7 +69,7 @@ void PairEngine::load(const Scene& scene, const State& s, FluidCoupling* fluid) 
   search();
   if (s.staggered) return;
   start(scene);
-  if (!bed_.uses.damped) return;
+  if (!bed_.uses.damping()) return;
   State begun = state();
   remember_velocities(scene, begun);
   load(scene, begun, fluid);

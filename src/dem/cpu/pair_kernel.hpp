@@ -15,6 +15,16 @@ namespace moraine::dem::cpu {
 
 constexpr int block_pairs = 64;  // that go through the phases together
 
+// Where a list comes from: large beds do not stay in a processor's cache from step to step. Theirs are asked
+// for two blocks ahead, which takes a tenth off a step; in the cache it would cost 2 %.
+enum class Lists { in_cache, from_memory };
+constexpr Index grains_in_cache = 30'000;
+template <class Entry>
+void ask_for(const Entry& entry) {
+  const char* const first = reinterpret_cast<const char*>(&entry);
+  for (std::size_t at = 0; at < sizeof entry; at += 64) __builtin_prefetch(first + at);
+}
+
 // Where j's share of a pair goes.
 enum class Shares { in_place, to_slots };
 
@@ -96,7 +106,15 @@ inline void remember(const Spring<P>& spring, PairList& list, std::int64_t place
   });
 }
 
-template <class L, Account account, Shares shares, class P>
+template <class L, Account account>
+inline void ask_for(const PairList& list, std::int64_t group) {
+  ask_for(list.pairs[group]);
+  MoreParts::for_each_memory([&]<class Part>() {
+    if constexpr (L::template remembers<Part, account>) ask_for(list.of<Part>()[group]);
+  });
+}
+
+template <class L, Account account, Shares shares, Lists lists, class P>
 [[gnu::flatten]] void list_forces(Bed& bed, PairList& list, double dt, LoadRow* load) {
   constexpr int packs = block_pairs / P::width, packs_in_group = lanes / P::width;
   const Rows rows(bed.grain);
@@ -128,6 +146,8 @@ template <class L, Account account, Shares shares, class P>
       gather<L>(rows, sides, &p.i[lane(q)], &p.j[lane(q)], p.across_sides, motion[q]);
     }
     for (int q = 0; q < block; ++q) {
+      if constexpr (lists == Lists::from_memory)
+        ask_for<L, account>(list, std::min(start + q + 2 * packs, all - 1) / packs_in_group);
       geometry[q] = between_grains(motion[q].x_ij, motion[q].r_sum, motion[q].r_difference);
       if constexpr (L::rubs) slides[q] = slide(dt, geometry[q], motion[q].before);
     }
@@ -154,8 +174,12 @@ template <class L, Account account, Shares shares, class P>
 
 template <class L, Account account, class P>
 void pair_forces(Bed& bed, Chunk& chunk, const ChunkStep& at) {
-  list_forces<L, account, Shares::in_place, P>(bed, chunk.near[0], at.dt, at.load);
-  list_forces<L, account, Shares::to_slots, P>(bed, chunk.near[1], at.dt, at.load);
+  const auto both = [&]<Lists lists>() {
+    list_forces<L, account, Shares::in_place, lists, P>(bed, chunk.near[0], at.dt, at.load);
+    list_forces<L, account, Shares::to_slots, lists, P>(bed, chunk.near[1], at.dt, at.load);
+  };
+  bed.n > grains_in_cache ? both.template operator()<Lists::from_memory>()
+                          : both.template operator()<Lists::in_cache>();
 }
 
 }  // namespace moraine::dem::cpu

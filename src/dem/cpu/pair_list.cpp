@@ -20,7 +20,7 @@ bool PairList::remembers(Index place) const {
     else
       any = any || value != 0;
   };
-  MoreParts::for_each_memory([&]<class Part>() {
+  for_each_remembered([&]<class Part>() {
     const typename Part::template Memory<double>& memory = s;
     for_each_named(memory, memory, look);
   });

@@ -58,7 +58,8 @@ void store_lanes(const Vec3<P>& p, Vec3<Lanes>& to, std::int64_t lane) {
 
 struct PairList {
   std::vector<PairGroup> pairs;
-  MoreParts::MemoryLists<std::vector, Lanes> memory;  // by group
+  MoreParts::MemoryLists<std::vector, Lanes> memory;  // by group; empty where nothing is remembered
+  unsigned remembered = 0;                            // which parts of the law, bit by bit
   Index count = 0;
 
   void clear();
@@ -69,6 +70,14 @@ struct PairList {
   Spring<double> spring(Index place) const;
   bool remembers(Index place) const;  // whether any number of its spring is not zero
 
+  template <class Use>
+  void for_each_remembered(Use&& use) const {
+    unsigned bit = 1;
+    MoreParts::for_each_memory([&]<class Part>() {
+      if (remembered & bit) use.template operator()<Part>();
+      bit <<= 1;
+    });
+  }
   // What a part of the law remembers of each group.
   template <class Part>
   auto& of() {
@@ -110,7 +119,7 @@ inline Index PairList::add(Index i, Index j, Index target, bool across, const Sp
   PairGroup& p = pairs.back();
   p.i[lane] = row_bytes * i, p.j[lane] = row_bytes * j, p.target[lane] = row_bytes * target;
   p.across_sides |= across;
-  MoreParts::for_each_memory([&]<class Part>() {
+  for_each_remembered([&]<class Part>() {
     if (lane == 0) of<Part>().emplace_back();
     const typename Part::template Memory<double>& from = s;
     for_each_named(of<Part>().back(), from,
@@ -121,7 +130,7 @@ inline Index PairList::add(Index i, Index j, Index target, bool across, const Sp
 
 inline Spring<double> PairList::spring(Index place) const {
   Spring<double> s;
-  MoreParts::for_each_memory([&]<class Part>() {
+  for_each_remembered([&]<class Part>() {
     typename Part::template Memory<double>& to = s;
     for_each_named(to, of<Part>()[place / lanes], [&](const char*, auto& value, const auto& group) {
       get_lane(value, group, static_cast<int>(place % lanes));

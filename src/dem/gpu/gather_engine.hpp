@@ -74,7 +74,7 @@ class GatherEngine final : public Engine {
     refresh_view();
     if (s.staggered) return;
     start(control);
-    if (!uses_.damped) return;
+    if (!uses_.damping()) return;
     State begun = state();
     remember_velocities(scene, begun);
     load(scene, begun, fluid);

@@ -76,9 +76,12 @@ using CompiledLaws = std::tuple<  // between grains, at planes
     Laws<Linear<Frictionless, Undamped>, Linear<Frictionless, Undamped>>,
     Laws<Linear<Frictionless, Undamped>, Linear<Frictionless, Viscosity>>,
     Laws<Linear<Frictionless, Viscosity>, Linear<Frictionless, Viscosity>>,
+    Laws<Linear<Coulomb, Undamped>, Linear<Frictionless, Undamped>>,
     Laws<Linear<Coulomb, Undamped>, Linear<Coulomb, Undamped>>,
     Laws<Linear<Coulomb, Undamped>, Linear<Coulomb, Viscosity>>,
+    Laws<Linear<Coulomb, Viscosity>, Linear<Frictionless, Undamped>>,
     Laws<Linear<Coulomb, Viscosity>, Linear<Coulomb, Viscosity>>,
+    Laws<Linear<SofteningCoulomb, Undamped>, Linear<Frictionless, Undamped>>,
     Laws<Linear<SofteningCoulomb, Undamped>, Linear<SofteningCoulomb, Undamped>>,
     Laws<Linear<SofteningCoulomb, Undamped>, Linear<SofteningCoulomb, Viscosity>>,
     Laws<GeneralLaw, GeneralLaw>>;
