@@ -79,6 +79,37 @@ def friction_dilation(cases):
     return figure
 
 
+def taylor(cases, step=0.005):
+    """Taylor's relation (strength.py) at the lowest, a middle and the highest normal stress, and what it leaves in all cases."""
+    figure, (over, under) = plt.subplots(2, 1, figsize=(column, 4.4), sharex=True, gridspec_kw={"hspace": 0.12, "height_ratios": (2, 1)})
+    groups, left, end = [], [], np.inf
+    for sigma_0, own in by_stress(cases):
+        curves = [strength.taylor(shearing.of(c)) for c in own]
+        groups.append((sigma_0, curves))
+        end = min(end, *(c.strain[-1] for c in curves))
+    if not end > strength.window + step:
+        raise MissingData(f"{cases[0].directory} and others: sheared too little for windows of {strength.window:g} of strain")
+    strain = np.arange(strength.window / 2, end - strength.window / 2 + 1e-9, step)
+    def mean(curves, values):
+        return np.mean([np.interp(strain, c.strain[np.isfinite(v)], v[np.isfinite(v)]) for c in curves for v in [values(c)]], axis=0)
+    chosen = [groups[k] for k in sorted({0, len(groups) // 2, len(groups) - 1})]
+    for (sigma_0, curves), look in zip(chosen, lines(len(chosen))):
+        over.plot(strain, mean(curves, lambda c: c.friction), color=look["color"], label=f"{sigma_0 / kPa:g} kPa")
+        over.plot(strain, mean(curves, lambda c: c.mu_cs + c.rate), color=look["color"], linestyle=(0, (4, 1.5)), lw=0.8)
+    left = np.array([mean([c], lambda c: c.residual) for _, curves in groups for c in curves])
+    under.axhline(0, color="0.6", lw=0.5, zorder=0)
+    under.plot(strain, left.mean(axis=0), color=ink)
+    under.fill_between(strain, left.min(axis=0), left.max(axis=0), color=ink, alpha=0.15, lw=0)
+    over.set_ylabel("$\\tau/\\sigma'$;  $\\mu_{cs} + d\\epsilon_v/d\\gamma$")
+    over.legend(title="$\\sigma_0$", loc="upper right")
+    under.set_ylabel("left over")
+    under.set_xlabel("shear strain $\\gamma$")
+    under.set_xlim(0)
+    figure.align_ylabels()
+    panel(over, "a"), panel(under, "b")
+    return figure
+
+
 def mohr_coulomb(rows):
     """Fig. 14, Table 2: peak and ultimate strength of measured runs (see measure.py), their lines, and the other materials'."""
     figure, both = plt.subplots(2, 1, figsize=(column, 5.2), sharex=True, gridspec_kw={"hspace": 0.14})

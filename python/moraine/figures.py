@@ -69,6 +69,8 @@ all_figures = (
     Figure("fig04-friction-dilation", "Shear friction and dilation against shear strain (the paper's Fig. 4). Lines: mean over the "
            "seeds, smoothed over a strain of 0.01; bands: from the least to the largest. Stages of shear that follow each other are drawn with their signs.",
            lambda s: bed_figures.friction_dilation(s.cases)),
+    Figure("taylor", "Taylor's relation: friction (lines) against the friction of the critical state and dilation rate (dashed), means over the seeds; below, "
+           "what of the friction is neither, over all runs: mean and range. Windows of 0.02 of strain.", lambda s: bed_figures.taylor(s.cases)),
     Figure("fig05-pressure", "Pressure on each grain, the sum of its normal contact forces over its surface, in units of the normal "
            "stress (Fig. 5).", lambda s: force_figures.pressure_3d(s.sheared, s.one.normal_stress)),
     Figure("fig06-force-network", "Normal forces in a vertical slice, consolidated and sheared; free grains only (Fig. 6).",

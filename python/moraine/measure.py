@@ -51,6 +51,15 @@ def strengths(case, until=None):
     }
 
 
+def taylor(case, shear, consolidate):
+    """Taylor's relation (strength.py): at the smoothed peak, and over all the strain that windows reach."""
+    t = strength.taylor(shear)
+    known = t.residual[np.isfinite(t.residual)]
+    return {"friction_critical": t.mu_cs, "dilation_rate_peak": t.rate[t.at_peak], "dilation_rate_max": np.nanmax(t.rate),
+            "taylor_residual_peak": t.residual[t.at_peak], "taylor_residual_rms": np.sqrt(np.mean(known**2)),
+            "taylor_dilation_d": t.area * shearing.height_0(shear.series) / case.diameter}
+
+
 def tilt(tensor):
     """Angle from the vertical of the axis of its largest principal value, degrees; positive where it dips towards +x: of a stage seen along
     its shear (shearing.py), towards the shear."""
@@ -130,7 +139,7 @@ def measure(case, say=print):
     """The strengths, and all that can be had from consolidation and snapshots; what lacks data is left out, and said."""
     require_end(case)
     out = strengths(case)
-    for part in (about, consolidation, profiles, rotations, force_chains):
+    for part in (about, taylor, consolidation, profiles, rotations, force_chains):
         try:
             out |= part(case, shearing.of(case), case.stage("consolidate"))
         except MissingData as why:

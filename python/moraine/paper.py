@@ -14,6 +14,9 @@ C_p, C_p_se = 1.2, 0.21
 phi_u, phi_u_se = 22.0, 0.47
 C_u, C_u_se = 0.51, 0.31
 
+# Friction at 80 kPa by these lines, C/sigma_0 + tan(phi).
+friction_peak_80kPa, friction_ultimate_80kPa = 0.64, 0.41
+
 # Table 2: phi_p degrees, C_p kPa, phi_u degrees, C_u kPa
 materials = {
     "quartz sand": (45, 3.7, 44, 2.4),

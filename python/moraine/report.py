@@ -135,6 +135,26 @@ def dilation_lines(rows):
                    compare(value, paper.dilation["DEM (paper)"], further_run(column(high, "dilation_d")) + 0.05))
 
 
+def taylor_lines(rows):
+    if not known(rows, "taylor_residual_peak"):
+        return
+    where, peak_paper = "par. 29, 52; Taylor's relation", paper.friction_peak_80kPa
+    friction, rate = column(rows, "friction_critical"), column(rows, "dilation_rate_peak")
+    at_peak, half = mean_interval(column(rows, "taylor_residual_peak"))
+    rms = column(rows, "taylor_residual_rms").mean()
+    yield Line("friction = μ_cs + dε_v/dγ: what is left at the peak", where, "not tested there",
+               f"{show(at_peak, half, 3)}, {rms:.3f} (r.m.s.) over all strains; μ_cs {friction.min():.2f} to {friction.max():.2f}, "
+               f"dilation rates at the peak {rate.min():.2f} to {rate.max():.2f}",
+               "holds within 0.05" if np.abs(column(rows, "taylor_residual_peak")).max() < 0.05 else f"holds within {np.abs(column(rows, 'taylor_residual_peak')).max():.2f}")
+    if known(high := at(rows, 80), "taylor_dilation_d"):
+        own, seen = column(high, "taylor_dilation_d").mean(), column(high, "dilation_d").mean()
+        mu, left = column(high, "friction_critical").mean(), column(high, "taylor_residual_peak").mean()
+        yield Line("the same at 80 kPa: the dilation that friction above μ_cs asks for", where, f"a peak of {peak_paper:g} asks for a dilation rate of "
+                   f"{peak_paper - paper.friction_ultimate_80kPa:.2f} over its own ultimate friction of {paper.friction_ultimate_80kPa:g}",
+                   f"{own:.2f} of {seen:.2f} diameters; the paper's peak would take a rate of {peak_paper - mu - left:.2f} here, "
+                   f"where it is {column(high, 'dilation_rate_peak').mean():.2f}", "peak and dilation check each other")
+
+
 def profile_lines(rows):
     if known(low := at(rows, 10), "shear_zone_d"):
         value, half = mean_interval(column(low, "shear_zone_d"))
@@ -202,7 +222,7 @@ def rate_lines(rows):
 
 def quantities(rows):
     """All lines that can be drawn up from measured runs."""
-    return [line for part in (strength_lines, dilation_lines, profile_lines, force_lines, rotation_lines, rate_lines)
+    return [line for part in (strength_lines, dilation_lines, taylor_lines, profile_lines, force_lines, rotation_lines, rate_lines)
             for line in part(rows)]
 
 

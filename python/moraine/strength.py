@@ -79,6 +79,52 @@ def strength(stage, sampling=paper.sampling, until=None):
                     dilation.min(), strain[-1], rows["shear_stress"][raw].max())
 
 
+def slope(x, y, width=window):
+    """dy/dx of the straight line through the rows within width/2 of each; nan where the window reaches beyond the data, or has but one place."""
+    x = np.asarray(x, float)
+    mean_x, mean_y = smoothed(x, x, width), smoothed(x, y, width)
+    spread = smoothed(x, x * x, width) - mean_x**2
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(spread > 1e-9 * width**2, (smoothed(x, x * np.asarray(y, float), width) - mean_x * mean_y) / spread, np.nan)
+
+
+@dataclass(frozen=True)
+class Taylor:
+    """Taylor's relation, friction = mu_cs + d eps_v / d gamma: what shear does beyond the friction of the critical state lifts the bed.
+    With the height H that the bed has and the way x of its top, d eps_v / d gamma = dH/dx whatever the thickness that deforms."""
+    strain: np.ndarray
+    friction: np.ndarray    # smoothed
+    rate: np.ndarray        # dH/dx over the same windows
+    mu_cs: float            # mean of friction - dH/dx over the last third of the strain
+
+    @property
+    def residual(self):
+        """friction - mu_cs - dH/dx"""
+        return self.friction - self.mu_cs - self.rate
+
+    @property
+    def at_peak(self):
+        """Index of the smoothed peak."""
+        return int(np.nanargmax(self.friction))
+
+    @property
+    def area(self):
+        """Of friction above mu_cs over the strain, times H_0, that is in m: the dilation that the friction asks for."""
+        known = np.isfinite(self.friction)
+        return np.trapz((self.friction - self.mu_cs)[known], self.strain[known])
+
+
+def taylor(stage):
+    """Of a sheared stage, by windows as those of the smoothed peak. Raises MissingData where it is too short for one."""
+    rows = shearing.along(stage).series
+    strain = rows["shear_strain"]
+    friction, rate = smoothed(strain, rows["shear_friction"]), slope(strain, rows["dilation"] / shearing.height_0(rows))
+    late_rows = (strain >= late * strain[-1]) & np.isfinite(friction) & np.isfinite(rate)
+    if not late_rows.any():
+        raise MissingData(f"{rows.file}: too short for a window of {window:g} of strain")
+    return Taylor(strain, friction, rate, (friction - rate)[late_rows].mean())
+
+
 @dataclass(frozen=True)
 class MohrCoulomb:
     phi: float          # angle of internal friction, degrees
