@@ -14,6 +14,7 @@
 #include "dem/cpu/neighbour_lists.hpp"
 #include "dem/cpu/schedule.hpp"
 #include "dem/cpu/search_margin.hpp"
+#include "dem/cpu/thread_count.hpp"
 #include "dem/scene_check.hpp"
 #include "dem/state_rows.hpp"
 
@@ -23,20 +24,22 @@ namespace {
 
 class PairEngine final : public Engine {
  public:
-  explicit PairEngine(int threads) : threads_wanted_(threads) { space_.threads = std::max(1, threads); }
+  explicit PairEngine(int threads) : threads_wanted_(threads), threads_(std::max(1, threads)) {}
 
   void load(const Scene& scene, const State& state, FluidCoupling* fluid) override;
   void advance(std::int64_t steps) override;
   State state() const override;
   Counts counts() const override;
   std::string describe() const override;
-  int threads() const override { return space_.threads; }
+  int threads() const override { return threads_; }
 
  private:
+  void deal(int threads);
   void search();
   void start(const Scene& scene);
 
   const int threads_wanted_;  // 0: by the number of grains
+  int threads_;               // at most
   Host space_;
   Bed bed_;
   StepTasks tasks_;
@@ -45,6 +48,7 @@ class PairEngine final : public Engine {
   std::unique_ptr<Exchange> exchange_;
   std::unique_ptr<Schedule> schedule_;
   std::optional<SearchMargin> margin_;
+  std::optional<ThreadCount> count_;
   std::int64_t searches_ = 0;
   State kept_;  // what no step changes: ids, x_start, bodies that do not move
 };
@@ -54,7 +58,7 @@ void PairEngine::load(const Scene& scene, const State& s, FluidCoupling* fluid) 
   kept_ = {};
   kept_.id = s.id, kept_.x_start = s.x_start, kept_.bodies = s.bodies;
   // Below some 1,500 grains a thread waits longer at barriers than it works.
-  space_.threads = threads_wanted_ > 0 ? threads_wanted_ : std::clamp(s.size() / 1500, 1, available_cores());
+  threads_ = threads_wanted_ > 0 ? threads_wanted_ : std::clamp(s.size() / 1500, 1, available_cores());
   control_ = {};
   control_.bodies = motion_of(scene, s);
   control_.water = s.water;
@@ -62,7 +66,8 @@ void PairEngine::load(const Scene& scene, const State& s, FluidCoupling* fluid) 
   bed_.load_state(scene, s, control_.bodies);
   tasks_ = tasks_for(scene);
   exchange_ = std::make_unique<Exchange>(bed_.uses.water ? fluid : nullptr, s.water);
-  schedule_ = std::make_unique<Schedule>(bed_, space_.threads);
+  count_.emplace(threads_);
+  deal(threads_);
   margin_.emplace(bed_.margin, scene.neighbour_margin > 0 ? bed_.margin : 0.2 * bed_.margin,
                   std::max(bed_.margin, widest_margin(scene, s)));
   searches_ = 0;
@@ -91,6 +96,12 @@ void PairEngine::start(const Scene& scene) {
   }
 }
 
+// Chunks to so many threads.
+void PairEngine::deal(int threads) {
+  space_.threads = threads;
+  schedule_ = std::make_unique<Schedule>(bed_, threads);
+}
+
 void PairEngine::search() {
   const auto began = std::chrono::steady_clock::now();
   double times_drawn = 0;
@@ -109,7 +120,14 @@ void PairEngine::search() {
 
 void PairEngine::advance(std::int64_t steps) {
   while (steps > 0) {
-    const Schedule::Pause pause = schedule_->run(tasks_, *exchange_, control_, steps);
+    const std::int64_t together = std::min(steps, count_->steps_together());
+    std::int64_t left = together;
+    const auto began = std::chrono::steady_clock::now();
+    const Schedule::Pause pause = schedule_->run(tasks_, *exchange_, control_, left);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    steps -= together - left;
+    count_->ran(together - left, seconds, schedule_->interruptions());
+    if (count_->now() != schedule_->threads()) deal(count_->now());
     if (pause == Schedule::Pause::done) continue;
     check_lost(bed_, control_.bodies, kept_.id);  // of which the other pauses may come, too
     if (pause == Schedule::Pause::failed) exchange_->rethrow();
@@ -161,7 +179,7 @@ std::string PairEngine::describe() const {
 #else
   const char* set = "portable SIMD";
 #endif
-  return "cpu, " + std::to_string(space_.threads) + (space_.threads == 1 ? " thread, " : " threads, ") + set;
+  return "cpu, " + std::to_string(threads_) + (threads_ == 1 ? " thread, " : " threads, ") + set;
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include "dem/cpu/schedule.hpp"
 
+#include <sys/resource.h>
+
 #include <algorithm>
 
 #include "dem/body/plane_contact.hpp"
@@ -13,6 +15,13 @@ namespace {
 // thread is held up for longer than that.
 constexpr int turns_before_help = 300;
 constexpr int steps_between_checks = 256;
+
+// Of this thread.
+std::int64_t interruptions_so_far() {
+  rusage used{};
+  getrusage(RUSAGE_THREAD, &used);
+  return used.ru_nivcsw;
+}
 
 void find_lost(const Bed& bed, Chunk& chunk, const BodyMotion& bodies) {
   chunk.lost = -1;
@@ -253,10 +262,13 @@ Schedule::Pause Schedule::run(const StepTasks& tasks, Exchange& exchange, Contro
   Pause pause = Pause::done;
   const Control start = control;
   const std::int64_t wanted = steps;
+  interruptions_ = 0;
   run_team(threads_, [&](int thread) {
+    const std::int64_t before = interruptions_so_far();
     Worker worker(*this, tasks, exchange, barrier, thread, start, wanted);
     const Pause reason = worker.run();
     if (thread == 0) control = worker.control(), steps = worker.left(), pause = reason;
+    interruptions_ += interruptions_so_far() - before;
   });
   return exchange.has_failed() ? Pause::failed : pause;
 }

@@ -7,7 +7,8 @@
 //
 // Each thread owns a stretch of neighbouring chunks, most of which it finds in its own cache from the last
 // step, and begins with those that other threads wait for. It helps others only after it has waited for
-// longer than it costs to bring a chunk into another core's cache. Who does what changes no bit.
+// longer than it costs to bring a chunk into another core's cache. Where that does not do, because other
+// programs want the cores, fewer threads take over (thread_count.hpp). Who does what changes no bit.
 #pragma once
 #include <atomic>
 #include <memory>
@@ -30,6 +31,10 @@ class Schedule {
   // Steps until all are done, or until new candidates are needed (then control.stale, and the forces of the
   // step that it has come to are still to be done). `steps` counts down.
   Pause run(const StepTasks& tasks, Exchange& exchange, Control& control, std::int64_t& steps);
+
+  int threads() const { return threads_; }
+  // How often the system took a thread off its core in the last run, for another program.
+  std::int64_t interruptions() const { return interruptions_; }
 
   // Forces of all chunks where the grains are, into bed.load; dt as in ChunkStep. One thread.
   void evaluate(const StepTasks& tasks, const BodyMotion& bodies, double dt);
@@ -60,6 +65,7 @@ class Schedule {
   const int threads_;
   std::unique_ptr<Progress[]> progress_;  // by chunk
   std::vector<Buffers> buffers_;          // by thread
+  std::atomic<std::int64_t> interruptions_{0};
 };
 
 }  // namespace moraine::dem::cpu
