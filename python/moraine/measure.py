@@ -1,6 +1,7 @@
 """One line of numbers for each run: everything that the report compares with the paper."""
 from pathlib import Path
 import csv
+import io
 
 import numpy as np
 
@@ -150,10 +151,12 @@ def measure(case, say=print):
 def table(rows, file=None):
     """The same as CSV text; written to `file` where one is given."""
     names = list(dict.fromkeys(name for row in rows for name in row))
-    lines = [",".join(names)]
+    out = io.StringIO()
+    lines = csv.writer(out, lineterminator="\n")  # which puts into quotes what has a comma in it
+    lines.writerow(names)
     for row in rows:
-        lines.append(",".join(f"{row[n]:.6g}" if isinstance(row.get(n), float) else str(row.get(n, "")) for n in names))
-    text = "\n".join(lines) + "\n"
+        lines.writerow([f"{row[n]:.6g}" if isinstance(row.get(n), float) else row.get(n, "") for n in names])
+    text = out.getvalue()
     if file:
         Path(file).write_text(text)
     return text

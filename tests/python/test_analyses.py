@@ -13,7 +13,9 @@ rng = np.random.default_rng(1)
 def stage(strain, friction, dilation, rate=0.05, sigma_0=80e3):
     strain = np.asarray(strain, float)
     columns = {"shear_strain": strain, "stage_time": strain / rate, "shear_friction": np.asarray(friction, float),
-               "dilation_diameters": np.asarray(dilation, float), "shear_stress": sigma_0 * np.asarray(friction, float)}
+               "dilation_diameters": np.asarray(dilation, float), "dilation": np.asarray(dilation, float),
+               "height": 1 + np.asarray(dilation, float),  # m: H_0 and mean diameter are 1 m
+               "shear_stress": sigma_0 * np.asarray(friction, float)}
     return SimpleNamespace(series=Table("series.h5", columns, {}))
 
 
@@ -71,6 +73,28 @@ def test_reading_up_to_a_strain():
     x = np.linspace(0, 1, 2001)
     s = strength.strength(stage(x, x, x), until=0.5)
     assert s.strain == pytest.approx(0.5) and s.peak_raw == pytest.approx(0.5)
+
+
+def test_slope_is_that_of_the_line_through_a_window():
+    x = np.linspace(0, 1, 401)
+    got = strength.slope(x, 3 * x + 2, 0.02)
+    inside = np.isfinite(got)
+    assert np.allclose(got[inside], 3) and inside.sum() > 380 and not inside[0]
+    assert np.allclose(strength.slope(x, np.sin(5 * x), 0.02)[inside], 5 * np.cos(5 * x)[inside], atol=2e-3)
+    assert np.isnan(strength.slope(np.zeros(50), np.arange(50), 0.02)).all()  # at one place
+
+
+def test_taylor_s_relation_of_curves_that_keep_it_or_not():
+    x, mu_cs = np.linspace(0, 1, 2001), 0.35
+    friction = mu_cs + 0.2 * (x / 0.05) * np.exp(1 - x / 0.05)  # a peak of 0.55 at a strain of 0.05
+    lifted = 0.2 * 0.05 * np.e * (1 - (1 + x / 0.05) * np.exp(-x / 0.05))  # the integral of what is above mu_cs
+    kept = strength.taylor(stage(x, friction, lifted))
+    assert kept.mu_cs == pytest.approx(mu_cs, abs=1e-4)
+    assert np.nanmax(np.abs(kept.residual)) < 3e-3  # a line through a bent window is not quite its mean slope
+    assert kept.strain[kept.at_peak] == pytest.approx(0.05, abs=0.003)
+    assert kept.area == pytest.approx(lifted[-1], rel=0.02)
+    half = strength.taylor(stage(x, friction, lifted / 2))
+    assert half.residual[half.at_peak] == pytest.approx(0.1, abs=0.005) and half.mu_cs == pytest.approx(mu_cs, abs=1e-4)
 
 
 def test_mohr_coulomb_recovers_a_line_and_its_standard_errors():

@@ -227,6 +227,7 @@ def test_the_paper_s_one_run_may_lie_where_a_further_run_would():
 
 def test_table_survives_being_written(tmp_path):
     file = tmp_path / "m.csv"
-    measure.table(rows(), file)
+    measure.table([{"program": "moraine 0.1.0, cpu, 1 thread"} | r for r in rows()], file)
     again = measure.read_table(file)
+    assert again[0]["program"] == "moraine 0.1.0, cpu, 1 thread"  # with a comma in it
     assert again[0]["sigma_0_kPa"] == 10 and again[-1]["strain_peak"] == pytest.approx(rows()[-1]["strain_peak"], rel=1e-5)
