@@ -96,6 +96,7 @@ class Taylor:
     friction: np.ndarray    # smoothed
     rate: np.ndarray        # dH/dx over the same windows
     mu_cs: float            # mean of friction - dH/dx over the last third of the strain
+    area: float             # of friction above mu_cs over the strain; times H_0 it is the dilation that the friction asks for, m
 
     @property
     def residual(self):
@@ -107,12 +108,6 @@ class Taylor:
         """Index of the smoothed peak."""
         return int(np.nanargmax(self.friction))
 
-    @property
-    def area(self):
-        """Of friction above mu_cs over the strain, times H_0, that is in m: the dilation that the friction asks for."""
-        known = np.isfinite(self.friction)
-        return np.trapz((self.friction - self.mu_cs)[known], self.strain[known])
-
 
 def taylor(stage):
     """Of a sheared stage, by windows as those of the smoothed peak. Raises MissingData where it is too short for one."""
@@ -122,7 +117,8 @@ def taylor(stage):
     late_rows = (strain >= late * strain[-1]) & np.isfinite(friction) & np.isfinite(rate)
     if not late_rows.any():
         raise MissingData(f"{rows.file}: too short for a window of {window:g} of strain")
-    return Taylor(strain, friction, rate, (friction - rate)[late_rows].mean())
+    mu_cs = (friction - rate)[late_rows].mean()
+    return Taylor(strain, friction, rate, mu_cs, np.trapz(rows["shear_friction"] - mu_cs, strain))
 
 
 @dataclass(frozen=True)
