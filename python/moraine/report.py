@@ -118,8 +118,11 @@ def strength_lines(rows):
                 ("φ", fit.phi, phi_half, phi, phi_se, phi_digit, "°", [f[key].phi for f in each]),
                 ("C", fit.C / 1e3, C_half / 1e3, C, C_se, C_digit, " kPa", [f[key].C / 1e3 for f in each])):
             alone = f"; each seed alone: {show(*mean_interval(own), 2, unit)}" if len(each) > 1 else ""
+            verdict = compare(value, reference, np.hypot(half, t * se) + digit)
+            if name == "φ" and verdict == "lower" and column(rows, "grains").min() >= paper.grains:
+                verdict = "lower: not from this model (cases/paper-2013/notes-fast.md)"
             yield Line(f"{name}_{letter} ({how})", "par. 30, Table 2", f"{reference:g} ± {se:g}{unit} (s.e.)",
-                       show(value, half, 2, unit) + alone, compare(value, reference, np.hypot(half, t * se) + digit))
+                       show(value, half, 2, unit) + alone, verdict)
     yield order("peak friction falls with σ_0", "par. 29, Fig. 4", "it depends on σ_0", rows, "friction_peak", falling=True)
     yield order("ultimate friction falls with σ_0", "par. 29, Fig. 4", "it depends on σ_0", rows, "friction_ultimate", falling=True)
 
@@ -224,6 +227,18 @@ def quantities(rows):
     """All lines that can be drawn up from measured runs."""
     return [line for part in (strength_lines, dilation_lines, taylor_lines, profile_lines, force_lines, rotation_lines, rate_lines)
             for line in part(rows)]
+
+
+def in_short(lines):
+    """Which of them agree with the paper and which do not, in three sentences."""
+    kinds = {"Agrees with the paper, or holds": ("agrees", "holds"), "Does not": ("lower", "higher", "does not hold", "no trend"),
+             "Cannot be told": ("too few", "not tested")}
+    said = []
+    for words, beginnings in kinds.items():
+        found = [x.quantity for x in lines if x.verdict.startswith(beginnings)]
+        if found:
+            said.append(f"{words} ({len(found)}): {'; '.join(found)}.")
+    return " ".join(said)
 
 
 @dataclass(frozen=True)
@@ -381,6 +396,7 @@ def build(study, output, notes=None, say=print):
                    "would come out like it with a probability of 95 %. Single runs are in measurements.csv.")
     text.heading("The paper's numbers and these")
     lines = quantities(rows)
+    text.paragraph(in_short(lines))
     text.table(["quantity", "paper", "here", "verdict", "where"], [[x.quantity, x.paper, x.ours, x.verdict, x.where] for x in lines])
     for why in left_out:
         text.paragraph(why)

@@ -211,6 +211,12 @@ def test_what_was_not_measured_is_left_out():
     assert find(lines, "shear zone (5 %").verdict == "not tested"
 
 
+def test_in_short():
+    lines = [report.Line(q, "", "", "", v) for q, v in (("dilation", "agrees"), ("order", "holds"), ("φ_p", "lower: not from this model (notes)"),
+                                                         ("zone", "too few runs to tell"), ("I", "the paper's own Table 1 gives 5.1e-4"))]
+    assert report.in_short(lines) == ("Agrees with the paper, or holds (2): dilation; order. Does not (1): φ_p. Cannot be told (1): zone.")
+
+
 def test_mean_and_interval():
     mean, half = report.mean_interval([1.0, 2.0, 3.0])
     assert mean == 2.0 and half == pytest.approx(4.30265 / np.sqrt(3), rel=1e-5)
