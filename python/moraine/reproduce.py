@@ -62,14 +62,16 @@ def study_of(args):
 
 
 def hold(home, study):
-    """Open files that keep other commands off this study and its settled beds; the system lets go of them however this one ends."""
+    """Open files that keep other commands off this study and its settled beds; the system lets go of them however this one ends.
+    Variants may share beds that have settled already."""
     held = []
     for name in sorted({study.name, study.bed}):
         directory = home / "runs" / name
         directory.mkdir(parents=True, exist_ok=True)
         held.append((directory / ".lock").open("w"))
+        only_read = name != study.name and all((directory / f"seed-{seed}" / "settle.done").exists() for seed in study.seeds)
         try:
-            fcntl.flock(held[-1], fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(held[-1], (fcntl.LOCK_SH if only_read else fcntl.LOCK_EX) | fcntl.LOCK_NB)
         except BlockingIOError:
             raise MissingData(f"{directory} is in use by another reproduce; wait for its end") from None
     return held

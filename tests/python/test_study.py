@@ -127,6 +127,24 @@ def test_two_at_once_do_not_share_a_bed(tmp_path):
     reproduce.hold(tmp_path, Study(seeds=[1], settings={"wall.mass": "64 kg"}))
 
 
+def test_variants_share_a_bed_that_has_settled(tmp_path):
+    heavy, slow = (Study(seeds=[1], settings={key: value}) for key, value in (("wall.mass", "64 kg"), ("model.f", "0.1")))
+    (tmp_path / "runs/fast/seed-1").mkdir(parents=True)
+    with contextlib.ExitStack() as stack:
+        for file in reproduce.hold(tmp_path, heavy):  # it will settle the bed
+            stack.enter_context(file)
+        with pytest.raises(MissingData, match="runs/fast is in use"):
+            reproduce.hold(tmp_path, slow)
+    (tmp_path / "runs/fast/seed-1/settle.done").touch()
+    with contextlib.ExitStack() as stack:
+        for study in heavy, slow:
+            for file in reproduce.hold(tmp_path, study):
+                stack.enter_context(file)
+        for study in heavy, Study(seeds=[1]):
+            with pytest.raises(MissingData, match="is in use by another reproduce"):
+                reproduce.hold(tmp_path, study)
+
+
 def test_seeds():
     assert seeds("3") == [1, 2, 3] and seeds("4,7") == [4, 7]
     for wrong in ("0", "a", "1,", "-1"):
