@@ -5,6 +5,7 @@
 //   tasks.hpp            the tasks of a step: pair_forces.cpp, body_forces.cpp, motion.cpp
 //   water_exchange.hpp   meeting the pore water
 //   schedule.hpp         which thread does what, when
+//   search_margin.hpp, thread_count.hpp  what follows the clock, and changes no bit
 #include <algorithm>
 #include <chrono>
 #include <memory>
