@@ -69,6 +69,7 @@ struct Stage {
   double velocity;      // m/s, of the top layer; 0 where strain_rate is given
   double strain_rate;   // 1/s; times the bed height gives the velocity (shear), or axial rate (uniaxial)
   double shear_stress;  // Pa, for shear_stress
+  double layer_mass;    // kg, that the shear stress moves besides the grains of the layer
   double bottom_layer, top_layer;  // m, thickness by grain centres; negative: one largest diameter
   bool hold_layer_height;
   double f;                           // eq. 9

@@ -199,6 +199,7 @@ std::vector<Key> make_keys() {
       row<&S::velocity>("stage.velocity", "m/s", "0", "", "of the top layer; this or strain_rate", "shear"),
       row<&S::strain_rate>("stage.strain_rate", "1/s", "0", "", "velocity over H_0, the height of the bed when shear began; or axial", "shear, uniaxial"),
       row<&S::shear_stress>("stage.shear_stress", "Pa", "0", "", "that drives the top layer", "shear_stress"),
+      row<&S::layer_mass>("stage.layer_mass", "kg", "0", ">= 0", "that the shear stress moves besides the layer's grains, such as that of the ice above", "shear_stress"),
       row<&S::bottom_layer>("stage.bottom_layer", "m", "-1", "", "thickness of the layer that stands still; negative: one largest diameter. A stage that shears on keeps the layers of the one before", sheared),
       row<&S::top_layer>("stage.top_layer", "m", "-1", "", "thickness of the driven layer; negative: one largest diameter", sheared),
       row<&S::hold_layer_height>("stage.hold_layer_height", "", "false", "", "the layers keep their height too", sheared),

@@ -245,10 +245,11 @@ Observation observe(const Scene& scene, const State& s, const Loads& loads) {
   if (free > 0 && normal_force > 0) o.unbalanced_force = net / free / normal_force;
   const BodyMotion bodies = motion_of(scene, s);
   for (int k = 0; k < bodies.servos; ++k) {
-    const Servo& plane = bodies.servo[k];
-    if (!plane.is_plane() || !plane.by_stress()) continue;
-    const double half = s.staggered ? 0.5 * scene.dt * plane.acceleration(area) : 0;
-    e.wall_kinetic += 0.5 * plane.mass * plane.v * (plane.v + 2 * half);
+    const Servo& servo = bodies.servo[k];
+    if (!servo.by_stress()) continue;
+    const double half = s.staggered ? 0.5 * scene.dt * servo.acceleration(area) : 0;
+    const double mass = scene.body(servo.body).mass;  // a layer's grains have been counted
+    e.wall_kinetic += 0.5 * mass * servo.v * (servo.v + 2 * half);
   }
   return o;
 }

@@ -58,7 +58,7 @@ const std::vector<Column>& columns() {
       {"elastic_normal", "J", "energy of the normal springs"},
       {"elastic_tangential", "J", "energy of the tangential springs"},
       {"potential", "J", "potential energy in gravity"},
-      {"wall_kinetic", "J", "kinetic energy of the top wall"},
+      {"wall_kinetic", "J", "kinetic energy of the top wall, and of layer_mass"},
       {"slip", "J", "dissipated by sliding friction since the stage began"},
       {"viscous", "J", "dissipated by contact viscosity since the stage began"},
       {"top_wall_work", "J", "work of the load on the top wall since the stage began"},

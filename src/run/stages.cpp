@@ -72,6 +72,7 @@ dem::Scene scene_of(const cases::Case& c, const cases::Stage& stage, const Start
           : dem::Drive::by(stage.shear_stress);
   scene.body(BodyId::bottom_layer) = dem::layer({}, stage.hold_layer_height);
   scene.body(BodyId::top_layer) = dem::layer(along_x, stage.hold_layer_height);
+  scene.body(BodyId::top_layer).mass = stage.layer_mass;
   return scene;
 }
 

@@ -26,6 +26,9 @@ std::vector<Variant> variants() {
   for (Contact& c : smooth.state.contacts) c.spring.delta_t = {0, 0, 0};
   for (WallContact& c : smooth.state.wall_contacts) c.spring.delta_t = {0, 0, 0};
   all.push_back({"a side wall moves in", squeezed_bed()});
+  all.push_back({"layer and a mass on it, driven by stress", sheared_bed()});
+  drive_top_layer(all.back().bed.scene, Drive::by(200));
+  all.back().bed.scene.body(BodyId::top_layer).mass = 10;  // kg, tens of times the layer's grains
   all.push_back({"sheared along side walls", sheared_between_walls()});
   return all;
 }

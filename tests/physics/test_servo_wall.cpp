@@ -55,6 +55,34 @@ TEST_P(ServoWall, SwingsAtItsFrequencyAroundItsStress) {
   EXPECT_NEAR(sum / (periods * per_period) / (stress * s.area()), 1, 1e-6);
 }
 
+// A layer of two grains with nothing in its way: a stress T along x gives them, and the mass M that rests on
+// them, the same acceleration T A/(2 m + M), and its work is their kinetic energy.
+TEST_P(ServoWall, AStressMovesALayerAndTheMassOnIt) {
+  const auto engine = make();
+  Scene s = empty_space(1e5);
+  s.periodic_x = true;
+  s.dt = 1e-3;
+  const double r = 0.01, heavy = 0.7, stress = 0.2;
+  drive_top_layer(s, Drive::by(stress), true);
+  State start = grains_at_rest({r, r}, {{0.3, 0.3, 0.5}, {0.7, 0.7, 0.5}});
+  start.part_of = {BodyId::top_layer, BodyId::top_layer};
+  for (const double on_top : {0.0, heavy}) {
+    s.body(BodyId::top_layer).mass = on_top;
+    const State now = run(*engine, s, start, 100);
+    const double a = stress * s.area() / (2 * mass(s, r) + on_top), t = 100 * s.dt;
+    for (int i = 0; i < 2; ++i) {
+      EXPECT_NEAR(now.x[i].x - start.x[i].x, 0.5 * a * t * t, 1e-12 * a);
+      EXPECT_NEAR(now.v[i].x, a * (t - 0.5 * s.dt), 1e-12 * a);  // staggered
+    }
+    // Kinetic energies are 1/2 m v(n - 1/2).v(n + 1/2).
+    const double squared = a * a * (t * t - 0.25 * s.dt * s.dt);
+    const Energy e = observe(s, now).energy;
+    EXPECT_NEAR(e.wall_kinetic, 0.5 * on_top * squared, 1e-12 * squared);
+    EXPECT_NEAR(e.total(), 0.5 * (2 * mass(s, r) + on_top) * squared, 1e-12 * squared);
+    EXPECT_NEAR(now.ledger.layers, stress * s.area() * 0.5 * a * t * t, 1e-12);
+  }
+}
+
 // On a bed of grains at random, with damping, it comes to rest where the grains bear its load.
 TEST_P(ServoWall, RestsOnABedAtItsStress) {
   const auto engine = make();

@@ -39,6 +39,8 @@ const Kind kinds[] = {
      0.0625},
     {"creep", "",
      "kind = \"shear_stress\"\nnormal_stress = 2000\nshear_stress = 900\nmu_s = 0.6\nmu_d = 0.3\n", 0.0625},
+    {"creep_under_a_mass", "",
+     "kind = \"shear_stress\"\nnormal_stress = 2000\nshear_stress = 900\nlayer_mass = 3\n", 0.0625},
     {"uniaxial", "", "kind = \"uniaxial\"\nstrain_rate = 0.3\n", 0.0625},
     {"fixed", "", "kind = \"shear\"\ntop_wall = \"fixed\"\nstrain_rate = 1\nhold_layer_height = true\n",
      0.0625},

@@ -65,8 +65,9 @@ struct Body {
   std::int32_t axis = 2;  // of a plane's normal
   double facing = 1;      // of a plane: 1 where the grains are on its side of larger coordinates, else -1
   double place =
-      0;            // m, along the axis, of a plane that does not move along it (else State says where it is)
-  double mass = 0;  // kg, of a plane that a stress drives; that of a layer is its grains'
+      0;  // m, along the axis, of a plane that does not move along it (else State says where it is)
+  double mass =
+      0;  // kg, of a plane that a stress drives; of a layer: what the stress moves besides its grains
   Material material = Material::wall;
   Drive x{}, y{}, z{};
 
