@@ -1,36 +1,35 @@
-"""./moraine reproduce NAME: runs the study of cases/NAME/Snakefile, what is missing of it, and ends with figures and a report."""
+"""./moraine reproduce NAME: runs the study of cases/NAME/study.toml, what is missing of it, and ends with figures and a report."""
 from pathlib import Path
 import fcntl
 import os
 import re
 import shutil
 import subprocess
-import sys
 
-from .study import Study, stresses as paper_stresses
 from .case import MissingData
+from .study import Study, read
 
 root = Path(__file__).resolve().parents[2]
 
 
 def studies():
-    return sorted(p.parent.name for p in (root / "cases").glob("*/Snakefile"))
+    return sorted(p.parent.name for p in (root / "cases").glob("*/study.toml"))
 
 
 def arguments(parser):
-    parser.add_argument("NAME", help=f"a directory in cases/ with a Snakefile: {', '.join(studies())}")
+    parser.add_argument("NAME", help=f"a directory in cases/ with a study.toml: {', '.join(studies())}")
     parser.add_argument("--preset", default="fast", choices=("paper", "standard", "fast"),
                         help="accuracy against time (default: %(default)s)")
-    parser.add_argument("--seeds", help="how many random packings, or which: 4,5,6 (default: 3; with --quick 2)")
-    parser.add_argument("--quick", action="store_true", help="1,000 grains instead of 10,000: minutes instead of hours")
+    parser.add_argument("--seeds", help="how many random packings, or which: 4,5,6 (default: as study.toml has it)")
+    parser.add_argument("--quick", action="store_true", help="a small version, as study.toml describes it: minutes instead of hours")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="sets",
                         help="override a key of case.toml, by its full name: --set wall.mass=64kg; makes a study beside the one without. "
-                             "--set normal_stress=30,100kPa: these normal stresses instead of the paper's; the report has all there are")
+                             "A list of study.toml, such as --set normal_stress=30,100kPa: these values instead; the report has all there are")
     parser.add_argument("--settled", default="", metavar="STUDY",
                         help="shear the beds that this study has settled (such as fast) instead of settling them again")
     parser.add_argument("--output", metavar="DIR", help="of the report (default: runs/STUDY/results beside the Snakefile)")
     parser.add_argument("--cores", type=int, default=os.cpu_count(), help="CPU cores to use (default: all, %(default)s)")
-    parser.add_argument("--gpu", action="store_true", help="on one GPU, all normal stresses of a seed at once")
+    parser.add_argument("--gpu", action="store_true", help="on one GPU, all runs of a case and seed at once")
     parser.add_argument("--dry-run", action="store_true", help="say what would run")
 
 
@@ -40,36 +39,38 @@ def seeds(text):
     return [int(s) for s in text.split(",")] if "," in text else list(range(1, int(text) + 1))
 
 
-def study_of(args):
-    settings, stresses = {}, paper_stresses
+def study_of(args, home):
+    lists_there = {k for case in read(home)["case"] for k in case.get("lists", {})}
+    settings, lists = {}, {}
     for text in args.sets:
         key, equals, value = text.partition("=")
+        like = next((k for k in lists_there if "." not in k and key.endswith("." + k)), "")
         if not equals or not value:
             raise MissingData(f"--set {text}: expected KEY=VALUE")
-        if key == "normal_stress":
-            stresses = value if "," in value else value + ","
+        if key in lists_there:
+            lists[key] = value if "," in value else value + ","
         elif key in ("seed", "grains.seed", "preset", "model.preset"):
             raise MissingData(f"--set {text}: give --{key.rpartition('.')[2].replace('seed', 'seeds')} instead")
-        elif key.endswith(".normal_stress"):
-            raise MissingData(f"--set {text}: give --set normal_stress={value}, which holds for all stages")
+        elif like:
+            raise MissingData(f"--set {text}: give --set {like}={value}, which holds for all stages")
         elif "." not in key:
             raise MissingData(f"--set {text}: expected the full name of the key, such as wall.mass; ./moraine keys lists them")
         else:
             settings[key] = value
-    return Study(args.preset, seeds(args.seeds or ("2" if args.quick else "3")), stresses, args.quick, settings, args.settled,
-                           str(Path(args.output).resolve()) if args.output else "", gpu=args.gpu,
-                           moraine=os.environ.get("MORAINE_LAUNCHER", str(root / "moraine")))
+    return Study(home, args.preset, seeds(args.seeds) if args.seeds else [], args.quick, settings, lists, args.settled,
+                 str(Path(args.output).resolve()) if args.output else "", gpu=args.gpu,
+                 moraine=os.environ.get("MORAINE_LAUNCHER", str(root / "moraine")))
 
 
-def hold(home, study):
-    """Open files that keep other commands off this study and its settled beds; the system lets go of them however this one ends.
-    Variants may share beds that have settled already."""
+def hold(study):
+    """Open files that keep other commands off this study and the beds it uses; the system lets go of them however this one ends.
+    Variants may share beds that are finished."""
     held = []
     for name in sorted({study.name, study.bed}):
-        directory = home / "runs" / name
+        directory = study.home / "runs" / name
         directory.mkdir(parents=True, exist_ok=True)
         held.append((directory / ".lock").open("w"))
-        only_read = name != study.name and all((directory / f"seed-{seed}" / "settle.done").exists() for seed in study.seeds)
+        only_read = name != study.name and all((study.home / study.done(bed, seed)).exists() for bed in study.beds for seed in study.seeds)
         try:
             fcntl.flock(held[-1], (fcntl.LOCK_SH if only_read else fcntl.LOCK_EX) | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -77,29 +78,36 @@ def hold(home, study):
     return held
 
 
-def check(home, study):
-    """Keys and values, before hours are spent: each kind of case of the first seed, as if it began with loose grains."""
-    for directory, _ in list(study.case_files())[:1 if study.settled else 2]:
-        stress = study.stress_list.rstrip(", ").split(",")[-1]
-        sets = ["--set", 'start=""'] + (["--set", f"normal_stress={stress}"] if directory.name == "shear" else [])
-        done = subprocess.run([study.moraine, "check", str(directory), *sets], cwd=home, capture_output=True, text=True)
+def check(study):
+    """Keys and values, before hours are spent: each case of the first seed, as if it began with loose grains."""
+    seed = study.seeds[0]
+    for name in study.wanted(seed):
+        sets = ["--set", 'start=""']
+        for key, values in study.parts[name].lists.items():
+            sets += ["--set", f"{key}={last_value(values)}"]
+        done = subprocess.run([study.moraine, "check", str(study.directory(name, seed)), *sets], cwd=study.home, capture_output=True, text=True)
         if done.returncode:
             raise MissingData(done.stderr.strip().removeprefix("moraine: "))
 
 
+def last_value(values):
+    """"10,20 kPa" -> "20 kPa"."""
+    return values.rstrip(", ").split(",")[-1].strip()
+
+
 def run(args):
     home = root / "cases" / args.NAME
-    if not (home / "Snakefile").exists():
-        raise MissingData(f"there is no {home}/Snakefile; studies: {', '.join(studies()) or 'none (they are in the repository)'}")
-    study = study_of(args)  # first, so that what is wrong with it is said before anything is to be installed
+    if not (home / "study.toml").exists():
+        raise MissingData(f"there is no {home}/study.toml; studies: {', '.join(studies()) or 'none (they are in the repository)'}")
+    study = study_of(args, home)  # first, so that what is wrong with it is said before anything is to be installed
     snakemake = shutil.which("snakemake")
     if not snakemake:
         raise MissingData("snakemake is not installed (Debian: apt-get install snakemake)")
-    held = [] if args.dry_run else hold(home, study)
+    held = [] if args.dry_run else hold(study)
     if not args.dry_run:
-        study.write_cases(home)
-        check(home, study)
-    command = [snakemake, "--snakefile", "Snakefile", "--cores", str(args.cores), "--configfile", str(study.write_config(home)),
+        study.write_cases()
+        check(study)
+    command = [snakemake, "--snakefile", "../Snakefile", "--cores", str(args.cores), "--configfile", str(study.write_config()),
                # What has been computed stays valid when only words of the workflow change.
                "--rerun-triggers", "mtime", "--keep-going", "--rerun-incomplete",
                "--nolock"]  # Snakemake's own lock outlives a power cut, and then wants to be removed by hand

@@ -1,53 +1,152 @@
-"""The study of cases/paper-2013: which runs there are and where they lie. Its Snakefile and `./moraine reproduce` share this.
+"""A study: the runs that ./moraine reproduce makes of a directory in cases/ that holds a study.toml, and where they lie.
 
-    runs/NAME/seed-S/settle                            grains settled at random
-    runs/NAME/seed-S/shear/sweep/normal_stress-80kPa   consolidated and sheared
+study.toml names the cases of the study, directories beside it, each once for each seed:
 
-NAME is the preset or quick, with what was set besides: fast+mass-64_kg. Such a variant starts from the bed that fast has
-settled, unless what is set concerns that bed (grains, box, the stage settle).
+    title = "..."                 of its report
+    report = "paper"              which report: paper, hardening or creep (moraine.report)
+    seeds = 3                     how many packings, where --seeds does not say
+
+    [[case]]
+    name = "settle"               the directory; what stands in its case.toml is taken over
+
+    [[case]]
+    name = "shear"
+    start = "settle"              the case it starts from; what another case starts from is called a bed
+    lists = { normal_stress = "10,20 kPa" }   one run for each value, or combination, by `moraine sweep`
+
+    [quick]                       what --quick changes
+    seeds = 2
+    set = { "grains.count" = "1000" }
+    lists = { normal_stress = "20 kPa," }
+
+They lie in
+
+    runs/NAME/seed-S/settle
+    runs/NAME/seed-S/shear/sweep/normal_stress-20kPa
+
+NAME is the preset or quick, with what was set besides: fast+mass-64_kg. Such a variant starts from the beds of the study without, unless
+what is set concerns those: grains, box, or one of their stages.
 """
 from dataclasses import dataclass, field
 from pathlib import Path
+import functools
 import json
 import os
 import re
 import sys
+import tomllib
 
-quick_bed = {"grains.count": "1000", "grains.columns_x": "4", "grains.columns_y": "4"}
-stresses = "10,20,40,60,80,120 kPa"
+from .case import MissingData
 
-
-def stress_names(text):
-    """"10,20 kPa" -> ["10kPa", "20kPa"], as `moraine sweep` names them."""
-    parts = [re.sub(r"(?<=\d) (?=\d{3}\b)", "", p.strip()) for p in text.rstrip(", ").split(",")]
-    unit = re.sub(r"^[-+0-9.eE]+", "", parts[-1]).strip()
-    return [re.sub(r"\s+", "", p) if re.search(r"[a-zA-Z]$", p) else p + unit for p in parts]
+of_beds = ("grains.", "box.")   # keys that concern a bed wherever they are set
 
 
-def variant_names(settings):
-    """mass-64_kg, shear.duration-2_s: the last word of the key, with its stage, or its table where two keys have the same last word."""
-    last = [key.rpartition(".")[2] for key in settings]
-    def name(key, word):
-        return key.removeprefix("stage.") if key.startswith("stage.") or last.count(word) > 1 else word
-    return [f"{name(key, word)}-{re.sub(r'[^A-Za-z0-9.-]+', '_', value)}" for word, (key, value) in zip(last, settings.items())]
+@dataclass(frozen=True)
+class Part:
+    """One of the cases of a study."""
+    name: str
+    start: str = ""                             # name of another one
+    lists: dict = field(default_factory=dict)   # KEY: "VALUE,VALUE unit"
+    stages: tuple = ()                          # names of the stages it runs
+
+    @property
+    def count(self):
+        """Of runs for one seed."""
+        product = 1
+        for values in self.lists.values():
+            product *= len([v for v in values.split(",") if v.strip()])
+        return product
 
 
-def concerns_bed(key):
-    return key.startswith(("grains.", "box.", "stage.settle."))
+@functools.cache
+def stages_of(directory):
+    """Names of the stages that the case in this directory runs, with what it takes over from others."""
+    file = directory / "case.toml"
+    try:
+        case = tomllib.loads(file.read_text())
+    except (OSError, tomllib.TOMLDecodeError) as why:
+        raise MissingData(f"{file}: {why}") from None
+    if case.get("stages"):
+        return tuple(case["stages"])
+    before = stages_of((directory / case["extends"]).resolve()) if case.get("extends") else ()
+    own = [s["name"] for s in case.get("stage", []) if "name" in s]
+    return before + tuple(name for name in own if name not in before)
+
+
+def read(home):
+    """study.toml of a directory; errors name the file and what would be right."""
+    file = Path(home) / "study.toml"
+    try:
+        what = tomllib.loads(file.read_text())
+    except FileNotFoundError:
+        raise MissingData(f"there is no {file}") from None
+    except tomllib.TOMLDecodeError as why:
+        raise MissingData(f"{file}: {why}") from None
+
+    def expect(fulfilled, key, wanted):
+        if not fulfilled:
+            raise MissingData(f"{file}: {key}: expected {wanted}")
+
+    known = {"title": (str, "a text"), "report": (str, "a text"), "seeds": (int, "a number"), "case": (list, "tables [[case]]"), "quick": (dict, "a table")}
+    for key, value in what.items():
+        expect(key in known, key, f"one of {', '.join(known)}")
+        expect(isinstance(value, known[key][0]), key, known[key][1])
+    expect(what.get("title"), "title", "a text")
+    expect(what.get("case"), "case", "at least one [[case]]")
+    for table in (what.get("quick", {}), *what["case"]):
+        for key, value in {**table.get("lists", {}), **table.get("set", {})}.items():
+            expect(isinstance(value, str), key, "a text, as --set takes it")
+    names = []
+    for case in what["case"]:
+        expect(not case.keys() - {"name", "start", "lists"}, "case", "name, start and lists")
+        expect(case.get("name") and (Path(home) / case["name"] / "case.toml").exists(), f"case.name = {case.get('name')}",
+               "a directory beside it, with a case.toml")
+        expect(case["name"] not in names, f"case.name = {case['name']}", "each case once")
+        expect(case.get("start", "") in ("", *names), f"case.start = {case.get('start')}", "a case above it")
+        names.append(case["name"])
+    return what
 
 
 @dataclass
 class Study:
+    home: str = "."                                 # directory of study.toml
     preset: str = "fast"
-    seeds: list = field(default_factory=lambda: [1, 2, 3])
-    stress_list: str = stresses
+    seeds: list = field(default_factory=list)       # empty: as study.toml has it
     quick: bool = False
-    settings: dict = field(default_factory=dict)    # KEY: VALUE besides the normal stress
-    settled: str = ""                               # name of the study whose settled beds are used; empty: see above
+    settings: dict = field(default_factory=dict)    # KEY: VALUE besides what study.toml has
+    lists: dict = field(default_factory=dict)       # KEY: VALUES in place of what study.toml has
+    settled: str = ""                               # name of the study whose beds are used; empty: see above
     results: str = ""
     moraine: str = "../../moraine"
     python: str = sys.executable    # one that has what `moraine report` imports; Snakemake's own may not
     gpu: bool = False
+
+    def __post_init__(self):
+        what = read(self.home)
+        quick = what.get("quick", {}) if self.quick else {}
+        self.title, self.report = what["title"], what.get("report", "paper")
+        self.quick_settings = quick.get("set", {})
+        if not self.seeds:
+            self.seeds = list(range(1, quick.get("seeds", what.get("seeds", 1)) + 1))
+        lists = {k: v for case in what["case"] for k, v in case.get("lists", {}).items()} | quick.get("lists", {}) | self.lists
+        self.parts = {case["name"]: Part(case["name"], case.get("start", ""), {k: lists[k] for k in case.get("lists", {})},
+                                         stages_of((Path(self.home) / case["name"]).resolve())) for case in what["case"]}
+        for key in self.lists:
+            if not any(key in part.lists for part in self.parts.values()):
+                raise MissingData(f"{key} is not a list of {Path(self.home) / 'study.toml'}")
+
+    @property
+    def beds(self):
+        """The cases that others start from."""
+        return {part.start for part in self.parts.values()} - {""}
+
+    def concerns_bed(self, key):
+        return key.startswith(of_beds) or any(self.concerns(key, self.parts[bed]) for bed in self.beds if key.startswith("stage."))
+
+    @staticmethod
+    def concerns(key, part):
+        """All but keys of stages that are not its own."""
+        return not key.startswith("stage.") or key.split(".")[1] in part.stages
 
     @property
     def base(self):
@@ -59,25 +158,48 @@ class Study:
 
     @property
     def bed(self):
-        """Name of the study whose settled grains are sheared."""
-        return self.settled or (self.name if any(map(concerns_bed, self.settings)) else self.base)
+        """Name of the study whose beds are used."""
+        return self.settled or (self.name if any(map(self.concerns_bed, self.settings)) else self.base)
 
-    @property
-    def stress_names(self):
-        return stress_names(self.stress_list)
+    def of_case(self, name):
+        """Name of the study that the case belongs to."""
+        return self.bed if name in self.beds else self.name
 
-    @property
-    def shear_threads(self):
-        return 1 if self.gpu else len(self.stress_names)
+    def directory(self, name, seed):
+        return Path("runs") / self.of_case(name) / f"seed-{seed}" / name
 
-    @property
-    def backend(self):
-        return "--backend cuda" if self.gpu else "--backend cpu"
+    def done(self, name, seed):
+        """The file that says that all runs of a case have finished, for these values of its lists."""
+        values = "+".join([name, *(f"{key.rpartition('.')[2]}-{safe(text)}" for key, text in self.parts[name].lists.items())])
+        return f"{self.directory(name, seed).parent}/{values}.done"
 
-    @property
-    def notes(self):
-        """What people have to say about the study of this name, for its report: notes-NAME.md beside the Snakefile."""
-        return f"--notes notes-{self.name}.md" if Path(f"notes-{self.name}.md").exists() else ""
+    def start(self, name, seed):
+        """Of these files a case needs the first, if any."""
+        start = self.parts[name].start
+        return [self.done(start, seed)] if start and not (self.settled and start in self.beds) else []
+
+    def wanted(self, seed):
+        """The cases to be run."""
+        return [name for name in self.parts if not (self.settled and name in self.beds)]
+
+    def all_done(self):
+        return [self.done(name, seed) for seed in self.seeds for name in self.wanted(seed)]
+
+    def threads(self, name):
+        return 1 if self.gpu else self.parts[name].count
+
+    def command(self, name, seed, threads):
+        """Words of the command that computes what is missing of a case."""
+        lists = self.parts[name].lists
+        sets = [word for key, text in lists.items() for word in ("--set", f"{key}={text}")]
+        return [self.moraine, "sweep" if lists else "run", str(self.directory(name, seed)), *sets, "--resume", "--threads", str(threads),
+                "--backend", "cuda" if self.gpu else "cpu"]
+
+    def report_command(self):
+        # What people have to say about the study of this name stands beside study.toml.
+        notes = f"notes-{self.name}.md"
+        return [self.python, "-m", "moraine", "report", f"runs/{self.name}", "--output", self.results,
+                *(["--notes", notes] if (Path(self.home) / notes).exists() else [])]
 
     @classmethod
     def from_config(cls, config):
@@ -86,17 +208,18 @@ class Study:
         study.results = study.results or f"runs/{study.name}/results"
         return study
 
-    def write_config(self, home):
-        """runs/NAME/study.json, for snakemake --configfile; relative to `home`."""
+    def write_config(self):
+        """runs/NAME/study.json, for snakemake --configfile; relative to `home`, where Snakemake runs."""
         file = Path("runs") / self.name / "study.json"
-        (home / file).parent.mkdir(parents=True, exist_ok=True)
-        (home / file).write_text(json.dumps(self.__dict__, indent=1) + "\n")
+        (self.home / file).parent.mkdir(parents=True, exist_ok=True)
+        fields = {k: v for k, v in self.__dict__.items() if k in self.__annotations__} | {"home": "."}
+        (self.home / file).write_text(json.dumps(fields, indent=1) + "\n")
         return file
 
-    def write_cases(self, home="."):
+    def write_cases(self):
         """The case.toml of each case, before anything runs. Those that are there stay; another one in its place is an error."""
         for directory, text in self.case_files():
-            file = Path(home) / directory / "case.toml"
+            file = Path(self.home) / directory / "case.toml"
             if not file.exists():
                 file.parent.mkdir(parents=True, exist_ok=True)
                 file.write_text(text)
@@ -106,18 +229,21 @@ class Study:
     def case_files(self):
         """(directory, text of case.toml) of each case."""
         for seed in self.seeds:
-            here = Path("runs") / self.name / f"seed-{seed}"
-            if not self.settled:
-                own = {k: v for k, v in self.settings.items() if concerns_bed(k)}
-                yield Path("runs") / self.bed / f"seed-{seed}" / "settle", self._text("settle", seed, own)
-            start = os.path.relpath(Path("runs") / self.bed / f"seed-{seed}" / "settle", here / "shear")
-            rest = {k: v for k, v in self.settings.items() if not k.startswith("stage.settle.")}
-            yield here / "shear", self._text("shear", seed, rest, f'start = "{start}"\n')
+            for name in self.wanted(seed):
+                yield self.directory(name, seed), self._text(self.parts[name], seed)
 
-    def _text(self, what, seed, settings, more=""):
+    def _text(self, part, seed):
+        own = self.settings.items()
+        if part.name in self.beds and self.bed != self.name:
+            own = []  # the beds of the study without
+        elif part.name in self.beds:
+            own = [(k, v) for k, v in own if self.concerns_bed(k)]
         tables = {"model.preset": json.dumps(self.preset), "grains.seed": str(seed)}
-        tables |= {k: toml(v) for k, v in ((quick_bed if self.quick else {}) | settings).items()}
-        text = f'extends = "../../../../{what}"\n{more}'
+        tables |= {k: toml(v) for k, v in (*self.quick_settings.items(), *own) if self.concerns(k, part)}
+        text = f'extends = "../../../../{part.name}"\n'
+        if part.start:
+            start = os.path.relpath(self.directory(part.start, seed), self.directory(part.name, seed))
+            text += f'start = "{start}"\n'
         by_table = {}
         for key, value in tables.items():
             table, _, leaf = key.rpartition(".")
@@ -127,6 +253,20 @@ class Study:
             text += f"\n[[stage]]\nname = \"{table[6:]}\"\n" if stage else f"\n[{table}]\n" if table else "\n"
             text += "".join(lines)
         return text
+
+
+def safe(text):
+    """For names of files."""
+    return re.sub(r"[^A-Za-z0-9.-]+", "_", text.rstrip(", "))
+
+
+def variant_names(settings):
+    """mass-64_kg, shear.duration-2_s: the last word of the key, with its stage, or its table where two keys have the same last word."""
+    last = [key.rpartition(".")[2] for key in settings]
+
+    def name(key, word):
+        return key.removeprefix("stage.") if key.startswith("stage.") or last.count(word) > 1 else word
+    return [f"{name(key, word)}-{safe(value)}" for word, (key, value) in zip(last, settings.items())]
 
 
 def toml(value):

@@ -8,24 +8,32 @@ import pytest
 
 from conftest import root
 from fake_case import FakeCase
-from moraine import measure, report, reproduce
+from moraine import measure, paper_report as report, reproduce
 from moraine.__main__ import main
 from moraine.case import Case, MissingData
-from moraine.study import Study, stress_names, toml
-from moraine.reproduce import seeds
+from moraine.study import Study as AnyStudy, toml
+from moraine.reproduce import last_value, seeds
+
+paper = root / "cases/paper-2013"
 
 
-def test_names_are_those_of_a_sweep():
-    assert stress_names("10,20 kPa") == ["10kPa", "20kPa"]
-    assert stress_names("80 kPa,") == ["80kPa"]
-    assert stress_names("10 kPa, 1 bar") == ["10kPa", "1bar"]
-    assert stress_names("12 500, 15 000 Pa") == ["12500Pa", "15000Pa"]
+def Study(home=paper, **what):
+    return AnyStudy(home=home, **what)
+
+
+def cases_of(study):
+    return {str(d): tomllib.loads(text) for d, text in study.case_files()}
+
+
+def test_every_study_can_be_read():
+    assert reproduce.studies() == ["creep-2016", "hardening-2015", "paper-2013"]
+    for name in reproduce.studies():
+        for quick in False, True:
+            assert cases_of(AnyStudy(root / "cases" / name, quick=quick))
 
 
 def test_a_study_and_its_cases():
-    study = Study(seeds=[4])
-    cases = {str(d): tomllib.loads(text) for d, text in study.case_files()}
-    assert cases == {
+    assert cases_of(Study(seeds=[4])) == {
         "runs/fast/seed-4/settle": {"extends": "../../../../settle", "model": {"preset": "fast"}, "grains": {"seed": 4}},
         "runs/fast/seed-4/shear": {"extends": "../../../../shear", "start": "../settle", "model": {"preset": "fast"},
                                    "grains": {"seed": 4}}}
@@ -34,7 +42,7 @@ def test_a_study_and_its_cases():
 def test_a_variant_shares_the_settled_bed():
     study = Study(seeds=[1], settings={"wall.mass": "64 kg", "stage.shear.clear_history": "true"})
     assert study.name == "fast+mass-64_kg+shear.clear_history-true"
-    cases = {str(d): tomllib.loads(text) for d, text in study.case_files()}
+    cases = cases_of(study)
     assert set(cases) == {"runs/fast/seed-1/settle", f"runs/{study.name}/seed-1/shear"}
     assert cases["runs/fast/seed-1/settle"].keys() == {"extends", "model", "grains"}
     shear = cases[f"runs/{study.name}/seed-1/shear"]
@@ -44,7 +52,7 @@ def test_a_variant_shares_the_settled_bed():
 
 def test_a_variant_of_the_bed_settles_its_own():
     study = Study(seeds=[1], settings={"stage.settle.mu_s": "0.1"})
-    cases = {str(d): tomllib.loads(text) for d, text in study.case_files()}
+    cases = cases_of(study)
     assert cases[f"runs/{study.name}/seed-1/settle"]["stage"] == [{"name": "settle", "mu_s": 0.1}]
     assert cases[f"runs/{study.name}/seed-1/shear"]["start"] == "../settle"
     assert "stage" not in cases[f"runs/{study.name}/seed-1/shear"]
@@ -60,6 +68,7 @@ def test_values_are_toml():
         ["0.5", "0.5", "1.0", "-3", "5.0", "1e-3", '"64 kg"', "true"]
     for text in map(toml, (".5", "1.", "-0", "1e5", "+3", "inf", "64 kg", 'a "b"')):
         tomllib.loads(f"x = {text}")
+    assert [last_value(v) for v in ("10,20 kPa", "80 kPa,", "full, pressure_gradient")] == ["20 kPa", "80 kPa", "pressure_gradient"]
 
 
 def test_normal_stresses_are_those_of_the_sweep(capsys):
@@ -71,37 +80,118 @@ def test_beds_of_another_study():
     study = Study(preset="paper", seeds=[1], settled="fast")
     (directory, text), = study.case_files()
     assert str(directory) == "runs/paper/seed-1/shear" and 'start = "../../../fast/seed-1/settle"' in text
+    assert study.start("shear", 1) == []  # nothing is to be settled first
 
 
-def test_a_case_of_another_study_is_not_overwritten(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    study = Study(seeds=[1])
+@pytest.fixture
+def home(tmp_path):
+    """A study of three cases, two of which start from the first."""
+    for name, text in {"bed": '[[stage]]\nname = "fall"\n[[stage]]\nname = "press"\n', "dry": 'extends = "../bed"\nstages = ["shear"]\n[[stage]]\nname = "shear"\n',
+                       "wet": 'extends = "../dry"\n'}.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "case.toml").write_text(text)
+    (tmp_path / "study.toml").write_text("""
+title = "three"
+seeds = 2
+[[case]]
+name = "bed"
+[[case]]
+name = "dry"
+start = "bed"
+[[case]]
+name = "wet"
+start = "bed"
+lists = { "fluid.permeability_factor" = "1e-13,1e-15 m2", "fluid.closure" = "full,pressure_gradient" }
+[quick]
+seeds = 1
+set = { "grains.count" = "1000", "stage.press.duration" = "0.1 s", "stage.shear.strain" = "0.1" }
+lists = { "fluid.closure" = "full," }
+""")
+    return tmp_path
+
+
+def test_runs_of_a_study_with_lists(home):
+    study = Study(home)
+    assert study.seeds == [1, 2] and study.beds == {"bed"}
+    assert study.parts["wet"].stages == ("shear",) and study.parts["bed"].stages == ("fall", "press")
+    assert study.command("wet", 2, 4) == [
+        "../../moraine", "sweep", "runs/fast/seed-2/wet", "--set", "fluid.permeability_factor=1e-13,1e-15 m2", "--set",
+        "fluid.closure=full,pressure_gradient", "--resume", "--threads", "4", "--backend", "cpu"]
+    assert study.command("dry", 1, 1)[1] == "run" and study.threads("wet") == 4 and study.threads("dry") == 1
+    assert study.start("wet", 1) == ["runs/fast/seed-1/bed.done"] and study.start("bed", 1) == []
+    assert study.done("wet", 1) == "runs/fast/seed-1/wet+permeability_factor-1e-13_1e-15_m2+closure-full_pressure_gradient.done"
+    other = Study(home, lists={"fluid.closure": "full,"})  # other values: other runs of the same study
+    assert other.name == study.name and other.done("wet", 1) != study.done("wet", 1) and other.threads("wet") == 2
+
+
+def test_a_quick_study_sets_what_concerns_each_case(home):
+    study = Study(home, quick=True)
+    cases = cases_of(study)
+    assert set(cases) == {f"runs/quick/seed-1/{name}" for name in ("bed", "dry", "wet")}
+    assert cases["runs/quick/seed-1/bed"]["stage"] == [{"name": "press", "duration": "0.1 s"}]
+    assert cases["runs/quick/seed-1/wet"]["stage"] == [{"name": "shear", "strain": 0.1}]
+    assert study.parts["wet"].lists["fluid.closure"] == "full,"
+
+
+def test_a_setting_of_a_bed_s_stage_makes_a_bed(home):
+    assert Study(home, settings={"stage.press.duration": "1 s"}).bed == "fast+press.duration-1_s"
+    assert Study(home, settings={"stage.shear.strain": "1", "fluid.compressibility": "1e-9 1/Pa"}).bed == "fast"
+
+
+@pytest.mark.parametrize("before, after, said", [
+    ('name = "dry"\nstart = "bed"', 'name = "dry"\nstart = "wet"', "case.start = wet: expected a case above it"),
+    ('name = "dry"', 'name = "moist"', "case.name = moist: expected a directory beside it, with a case.toml"),
+    ('name = "dry"', 'name = "bed"', "case.name = bed: expected each case once"),
+    ("seeds = 2", "seed = 2", "seed: expected one of title, report, seeds, case, quick"),
+    ("seeds = 2", 'seeds = "2"', "seeds: expected a number"),
+    ('"full,pressure_gradient"', "2", "fluid.closure: expected a text, as --set takes it"),
+    ("[quick]", "[quick", "study.toml"),
+])
+def test_what_is_wrong_with_a_study_is_said(home, before, after, said):
+    file = home / "study.toml"
+    file.write_text(file.read_text().replace(before, after, 1))
+    with pytest.raises(MissingData) as why:
+        Study(home)
+    assert said in str(why.value) and "study.toml" in str(why.value)
+
+
+def test_only_lists_of_a_study_have_other_values(home):
+    with pytest.raises(MissingData, match="wall.mass is not a list of"):
+        Study(home, lists={"wall.mass": "1,2"})
+
+
+def test_a_case_of_another_study_is_not_overwritten(home):
+    study = Study(home, seeds=[1])
     study.write_cases()
     study.write_cases()
-    file = tmp_path / "runs/fast/seed-1/settle/case.toml"
+    file = home / "runs/fast/seed-1/bed/case.toml"
     file.write_text("title = 'mine'\n")
     with pytest.raises(SystemExit, match="is not that of this study"):
         study.write_cases()
     assert file.read_text() == "title = 'mine'\n"
 
 
-def test_the_configuration_survives_being_written(tmp_path):
+def test_the_configuration_survives_being_written(home, monkeypatch):
     import json
-    study = Study(seeds=[1, 2], quick=True, settings={"wall.mass": "64 kg"})
-    file = study.write_config(tmp_path)
-    assert Study.from_config(json.loads((tmp_path / file).read_text())).name == study.name == "quick+mass-64_kg"
+    study = Study(home, seeds=[1, 2], quick=True, settings={"wall.mass": "64 kg"}, lists={"fluid.closure": "full,"})
+    file = study.write_config()
+    monkeypatch.chdir(home)  # where Snakemake runs
+    again = AnyStudy.from_config(json.loads(file.read_text()))
+    assert again.name == study.name == "quick+mass-64_kg" and again.all_done() == study.all_done()
+    assert again.results == "runs/quick+mass-64_kg/results"
 
 
 @pytest.mark.skipif(not shutil.which("snakemake"), reason="snakemake is not installed")
 def test_what_the_workflow_runs(tmp_path, monkeypatch):
     """With a launcher that only notes its arguments, in a directory whose name has a space."""
-    home = tmp_path / "a copy"
-    shutil.copytree(root / "cases/paper-2013", home / "cases/paper-2013", ignore=shutil.ignore_patterns("runs", ".snakemake", "results"))
-    launcher, calls = home / "moraine", home / "calls"
+    here = tmp_path / "a copy"
+    shutil.copytree(root / "cases/paper-2013", here / "cases/paper-2013", ignore=shutil.ignore_patterns("runs", ".snakemake", "results"))
+    shutil.copy(root / "cases/Snakefile", here / "cases")
+    launcher, calls = here / "moraine", here / "calls"
     launcher.write_text(f"""#!/bin/sh\nprintf '%s|' "$@" >>'{calls}'\necho >>'{calls}'\n""")
     launcher.chmod(0o755)
-    (home / "python").symlink_to(root / "python")
-    monkeypatch.setattr(reproduce, "root", home)
+    (here / "python").symlink_to(root / "python")
+    monkeypatch.setattr(reproduce, "root", here)
     monkeypatch.delenv("MORAINE_LAUNCHER", raising=False)
     assert main(["reproduce", "paper-2013", "--seeds", "1", "--cores", "1"]) != 0  # the report finds no run
     assert calls.read_text().splitlines() == [
@@ -110,39 +200,39 @@ def test_what_the_workflow_runs(tmp_path, monkeypatch):
         "run|runs/fast/seed-1/settle|--resume|--threads|1|--backend|cpu|",
         "sweep|runs/fast/seed-1/shear|--set|normal_stress=10,20,40,60,80,120 kPa|--resume|--threads|1|--backend|cpu|"]
     calls.unlink()
-    report = home / "cases/paper-2013/runs/fast/results/report.html"  # of before: no reason to leave out what is wanted besides
-    report.parent.mkdir(exist_ok=True)
-    report.touch()
+    written = here / "cases/paper-2013/runs/fast/results/report.html"  # of before: no reason to leave out what is wanted besides
+    written.parent.mkdir(exist_ok=True)
+    written.touch()
     main(["reproduce", "paper-2013", "--seeds", "1", "--cores", "1", "--set", "normal_stress=30kPa"])
     assert calls.read_text().splitlines()[2:] == ["sweep|runs/fast/seed-1/shear|--set|normal_stress=30kPa,|--resume|--threads|1|--backend|cpu|"]
 
 
-def test_two_at_once_do_not_share_a_bed(tmp_path):
+def test_two_at_once_do_not_share_a_bed(home):
     with contextlib.ExitStack() as stack:
-        for file in reproduce.hold(tmp_path, Study(seeds=[1])):
+        for file in reproduce.hold(Study(home)):
             stack.enter_context(file)
         with pytest.raises(MissingData, match="runs/fast is in use by another reproduce"):
-            reproduce.hold(tmp_path, Study(seeds=[1], settings={"wall.mass": "64 kg"}))
-        reproduce.hold(tmp_path, Study(preset="paper"))
-    reproduce.hold(tmp_path, Study(seeds=[1], settings={"wall.mass": "64 kg"}))
+            reproduce.hold(Study(home, settings={"wall.mass": "64 kg"}))
+        reproduce.hold(Study(home, preset="paper"))
+    reproduce.hold(Study(home, settings={"wall.mass": "64 kg"}))
 
 
-def test_variants_share_a_bed_that_has_settled(tmp_path):
-    heavy, slow = (Study(seeds=[1], settings={key: value}) for key, value in (("wall.mass", "64 kg"), ("model.f", "0.1")))
-    (tmp_path / "runs/fast/seed-1").mkdir(parents=True)
+def test_variants_share_a_bed_that_has_settled(home):
+    heavy, slow = (Study(home, seeds=[1], settings={key: value}) for key, value in (("wall.mass", "64 kg"), ("model.f", "0.1")))
+    (home / "runs/fast/seed-1").mkdir(parents=True)
     with contextlib.ExitStack() as stack:
-        for file in reproduce.hold(tmp_path, heavy):  # it will settle the bed
+        for file in reproduce.hold(heavy):  # it will settle the bed
             stack.enter_context(file)
         with pytest.raises(MissingData, match="runs/fast is in use"):
-            reproduce.hold(tmp_path, slow)
-    (tmp_path / "runs/fast/seed-1/settle.done").touch()
+            reproduce.hold(slow)
+    (home / "runs/fast/seed-1/bed.done").touch()
     with contextlib.ExitStack() as stack:
         for study in heavy, slow:
-            for file in reproduce.hold(tmp_path, study):
+            for file in reproduce.hold(study):
                 stack.enter_context(file)
-        for study in heavy, Study(seeds=[1]):
+        for study in heavy, Study(home, seeds=[1]):
             with pytest.raises(MissingData, match="is in use by another reproduce"):
-                reproduce.hold(tmp_path, study)
+                reproduce.hold(study)
 
 
 def test_seeds():
