@@ -4,14 +4,14 @@ _moraine() {
   root=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/..
   for ((i = 1; i < COMP_CWORD; ++i)); do
     case ${COMP_WORDS[i]} in
-      run | sweep | check | keys | bench | import-sphere | watch | figures | report | till | reproduce | test)
+      run | sweep | check | keys | bench | import-sphere | watch | figures | report | reproduce | test)
         command=${COMP_WORDS[i]}
         break
         ;;
     esac
   done
   case $command in
-    '') words="run sweep check keys bench import-sphere watch figures report till reproduce test --help --version --cuda" ;;
+    '') words="run sweep check keys bench import-sphere watch figures report reproduce test --help --version --cuda" ;;
     run) words="--resume --force --quiet --set --backend --threads --help" ;;
     sweep) words="--resume --force --quiet --set --at-once --backend --threads --help" ;;
     check) words="--set --backend --threads --help" ;;
@@ -19,13 +19,6 @@ _moraine() {
     watch) words="--interval --once --time --png --no-png --help" ;;
     figures) words="--output --format --only --help" ;;
     report) words="--output --notes --help" ;;
-    till)
-      case ${COMP_WORDS[i + 1]} in
-        "$word") words="quick hardening report --help" ;;
-        report) words="--output --help" ;;
-        *) words="--at-once --help" ;;
-      esac
-      ;;
     reproduce) words="--preset --seeds --quick --set --settled --output --cores --gpu --dry-run --help" ;;
     import-sphere | keys) words="--help" ;;
   esac
@@ -35,14 +28,14 @@ _moraine() {
     --set | --at-once | --threads | --steps | --stage | --interval | --format | --only | --seeds | --cores | --settled) return ;;
   esac
   COMPREPLY=()
-  if [[ ! $command || $command == till && $previous != --output || $word == -* || $previous == @(--backend|--preset) ]]; then
+  if [[ ! $command || $word == -* || $previous == @(--backend|--preset) ]]; then
     mapfile -t COMPREPLY < <(compgen -W "$words" -S ' ' -- "$word")
   elif [[ $command == import-sphere || $previous == @(--png|--output|--notes) ]]; then
     compopt -o filenames +o nospace
     mapfile -t COMPREPLY < <(compgen -f -- "$word")
   elif [[ $command == reproduce ]]; then  # by name
-    for d in "$root"/cases/*/Snakefile; do
-      d=${d%/Snakefile} d=${d##*/}
+    for d in "$root"/cases/*/study.toml; do
+      d=${d%/study.toml} d=${d##*/}
       [[ $d == '*' || $d != "$word"* ]] || COMPREPLY+=("$d ")
     done
   elif [[ $command == @(run|sweep|check|bench|watch|figures|report) ]]; then  # directories with a case in them, and those on the way there

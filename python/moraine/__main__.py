@@ -9,8 +9,7 @@ from .case import MissingData
 commands = {  # name: (module, what it does)
     "watch": ("watch", "follow a running case: friction, dilation and energy as they grow"),
     "figures": ("figures", "draw the paper's figures of one case, or of several beside each other"),
-    "report": ("report", "measure the runs of a study and hold them against the paper"),
-    "till": ("till", "run, measure and draw the experiments on till with pore water of cases/till"),
+    "report": ("report", "measure the runs of a study and hold them against what was published"),
     "reproduce": ("reproduce", "run a study that is described in cases/, and draw its figures and report"),
 }
 

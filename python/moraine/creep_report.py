@@ -37,10 +37,10 @@ class Record:
         return int(self.t[-1] / self.period + 0.01)
 
     def at(self, phase):
-        """Coordination at this phase of each period after the first."""
+        """Coordination around this phase of each period after the first: median over 0.1 s."""
         times = self.period * np.arange(1, self.periods + 1) + phase
-        times = times[times <= self.t[-1]]
-        return np.interp(times, self.t, self.coordination)
+        own = [np.abs(self.t - time) < 0.05 for time in times]
+        return np.array([np.median(self.coordination[o]) for o in own if o.any()])
 
     def level(self, phase):
         values = self.at(phase)
@@ -186,7 +186,7 @@ def phase_figure(runs, theirs):
     figure, ax = plt.subplots(figsize=(style.column * 1.5, 2.8))
     records = ([theirs] if theirs else []) + [r.record for r in runs]
     T = runs[0].period
-    phase = np.linspace(0, T, 251)[:-1]
+    phase = np.linspace(0, T, 101)[:-1]
     for record, colour in zip(records, ["tab:orange", "0.15", "tab:blue", "tab:green"] if theirs else ["0.15", "tab:blue", "tab:green"]):
         values = [record.at(p) for p in phase]
         if not all(map(len, values)):

@@ -2,20 +2,23 @@
 import h5py
 import numpy as np
 
-from fake_case import FakeCase, stage
+from fake_case import FakeCase, stage, toml
 
 cells, height = (3, 3, 4), 0.8
 water = {"viscosity": 1.8e-3, "compressibility": 4.5e-10, "permeability_factor": 3.5e-9}
 
 
-def write(directory, wet=True, rate=0.05, k_c=3.5e-9, snapshots=4, rows=None, peak=1.0):
+def write(directory, wet=True, rate=0.05, k_c=3.5e-9, snapshots=4, rows=None, peak=1.0, seed=1, **fluid):
     """A shear stage to a strain of 0.3. Wet: water that falls by 2 kPa at the peak of friction, `peak` times as high as a dry bed's, and
     snapshots whose pressure is -1000 Pa x the number of the level x that of the snapshot."""
     case = FakeCase(directory, [stage("shear", "shear", strain=0.3, strain_rate=rate, normal_stress=20e3, mu_s=0.3, fluid=wet)],
-                    fluid=water | {"enabled": wet, "permeability_factor": k_c})
+                    fluid=water | {"enabled": wet, "permeability_factor": k_c} | fluid)
+    case.settings["grains"]["seed"] = seed
+    (case.output / "case.toml").write_text(toml(case.settings))
     history = case.history(interval=0.001 / abs(rate), height=height)
     strain = abs(history["shear_strain"])
     history["total_friction"] = peak * history["shear_friction"]
+    history["shear_stress"] = peak * 20e3 * history["shear_friction"]
     history["water_pressure_mean"] = -2e3 * strain / 0.05 * np.exp(1 - strain / 0.05)
     case.write(history[:rows])
     if rows is None:

@@ -28,18 +28,10 @@ def test_commands():
     ("run", "--resume --force --quiet --set --backend --threads --help"),
     ("watch", "--interval --once --time --png --no-png --help"),
     ("figures", "--output --format --only --help"),
-    ("till quick", "--at-once --help"),
-    ("till hardening", "--at-once --help"),
-    ("till report", "--output --help"),
     ("reproduce", "--preset --seeds --quick --set --settled --output --cores --gpu --dry-run --help"),
 ])
 def test_options(command, options):
     assert complete(*command.split(), "-") == options.split()
-
-
-def test_experiments_on_till():
-    assert complete("till", "") == ["quick", "hardening", "report", "--help"] and complete("till", "qu") == ["quick"]
-    assert complete("till", "quick", "--at-once", "") == [] and complete("till", "report", "--output", "READ") == ["README.md"]
 
 
 def test_cases():
@@ -59,5 +51,5 @@ def test_studies(tmp_path):
     for name in ("study", "stage", "other"):
         (tmp_path / "cases" / name).mkdir(parents=True)
     for name in ("study", "other"):
-        (tmp_path / "cases" / name / "Snakefile").touch()
+        (tmp_path / "cases" / name / "study.toml").touch()
     assert complete("reproduce", "st", script=script, directory="/") == ["study"]
