@@ -232,7 +232,8 @@ def peaks_figure(tables):
     slow = published[min(published)]
     left.plot(list(published), list(published.values()), "k*-", lw=0.6, ms=6, label="published")
     right.plot(list(published), [p / slow for p in published.values()], "k*-", lw=0.6, ms=6)
-    series = [(f"{label}, {text}" if label else text, by_kind(rows), closure) for label, rows in tables.items() for closure, text in closures.items()]
+    series = [(f"{label.partition('+')[2] or label}, {text}" if label else text, by_kind(rows), closure)
+              for label, rows in tables.items() for closure, text in closures.items()]
     series = [s for s in series if any(k.closure == s[2] for k in s[1])]
     dry = {r["seed"]: r["peak"] for r in next(iter(tables.values())) if r["closure"] == "dry"}
     for (label, kinds, closure), look in zip(series, lines(len(series))):
