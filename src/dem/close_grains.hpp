@@ -13,9 +13,9 @@ namespace moraine::dem {
 
 class CloseGrains {
  public:
-  // Sorts them into cells at least `reach` wide (m). Throws Error if a coordinate is not finite.
-  void sort(const Host& space, const Scene& scene, const GrainRow* grains, Index n, double reach) {
-    cells_ = neighbours_.sort_into_cells(space, scene, grains, n, reach);
+  // Sorts them into cells; m, margin: that usually asked for. Throws Error if a coordinate is not finite.
+  void sort(const Host& space, const Scene& scene, const GrainRow* grains, Index n, double margin) {
+    cells_ = neighbours_.sort_into_cells(space, scene, grains, n, margin);
     n_ = n;
     for (std::vector<double>* const list : {&x_, &y_, &z_, &r_})
       list->resize(n + Pack::width);  // to a full pack
@@ -30,18 +30,18 @@ class CloseGrains {
   double r(Index k) const { return r_[k]; }
 
   // use(k, r + r_k + margin, square of the distance) for grains that are closer to x than that; k: their
-  // number in the order of cells, `from` or above. Asked with a reach that is at most that of the cells.
+  // number in the order of cells, `from` or above.
   template <class Use>
   void around(const Vec3d& x, double r, double margin, Index from, Use&& use) const {
     const Vec3<Pack> at{Pack(x.x), Pack(x.y), Pack(x.z)};
     const Pack r_and_margin(r + margin);
-    cells_->grid.runs_around(x, [&](std::int32_t first_cell, std::int32_t last_cell) {
+    const Sides& sides = cells_->levels.grid[0].sides;
+    cells_->levels.runs_around(x, r + margin, [&](std::int32_t first_cell, std::int32_t last_cell) {
       Index low = n_, end = 0;
       for (std::int32_t c = first_cell; c <= last_cell; ++c)
         if (cells_->first[c] < cells_->end[c]) low = std::min(low, cells_->first[c]), end = cells_->end[c];
       for (Index k = std::max(low, from); k < end; k += Pack::width) {
-        const Vec3<Pack> d =
-            nearest_image(cells_->grid.sides, at - Vec3<Pack>{load(x_, k), load(y_, k), load(z_, k)});
+        const Vec3<Pack> d = nearest_image(sides, at - Vec3<Pack>{load(x_, k), load(y_, k), load(z_, k)});
         const Pack reach = r_and_margin + load(r_, k), distance2 = dot(d, d);
         const unsigned in_run = (1u << std::min(end - k, Index{Pack::width})) - 1;
         for (unsigned close = bits(distance2 < reach * reach) & in_run; close != 0; close &= close - 1) {

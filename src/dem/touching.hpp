@@ -12,9 +12,7 @@ class TouchingPairs {
   // coordinate is not finite.
   template <class Visit>
   void each(const Scene& scene, const GrainRow* grains, Index n, Visit&& visit) {
-    double r_max = 0;
-    for (Index i = 0; i < n; ++i) r_max = std::max(r_max, grains[i].r);
-    grains_.sort(Host{}, scene, grains, n, 2 * r_max);
+    grains_.sort(Host{}, scene, grains, n, 0);
     for (Index k = 0; k < n; ++k)
       grains_.around(grains_.x(k), grains_.r(k), 0, k + 1, [&](Index l, double reach, double distance2) {
         visit(grains_.grain(k), grains_.grain(l), reach - std::sqrt(distance2));

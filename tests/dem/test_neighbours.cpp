@@ -32,14 +32,15 @@ void expect_all_pairs(const Case& c, std::uint64_t seed) {
   for (GrainRow& g : grains) {  // some well outside the box: within a stage nothing is wrapped
     g = {};
     for (int a = 0; a < 3; ++a) g.x[a] = uniform(-1.5, 2.5) * c.box[a];
-    g.r = g.r_again = uniform(c.r_min, c.r_max);
+    g.r = g.r_again =
+        std::exp(uniform(std::log(c.r_min), std::log(c.r_max)));  // as many in each class of sizes
   }
   const std::vector<BodyId> part_of(c.n, BodyId::none);
   const double margin = 0.1 * c.r_max;
   const Sides sides = Sides::of(s);
   const ContactOrder order{chunk_size(c.n)};
   Neighbours<Host> lists;
-  lists.build(Host{}, s, grains.data(), part_of.data(), c.n, c.r_max, margin);
+  lists.build(Host{}, s, grains.data(), part_of.data(), c.n, margin);
   std::int64_t total = 0;
   for (Index i = 0; i < c.n; ++i) {
     std::vector<Index> expected;
@@ -72,7 +73,7 @@ void expect_all_pairs(const Case& c, std::uint64_t seed) {
   EXPECT_EQ(found, touching);
 
   CloseGrains close;
-  close.sort(Host{}, s, grains.data(), c.n, 2 * c.r_max + margin);
+  close.sort(Host{}, s, grains.data(), c.n, margin);
   for (Index i = 0; i < c.n; ++i) {
     std::vector<Index> expected, around;
     for (Index j = 0; j < c.n; ++j)
@@ -101,12 +102,14 @@ TEST(Neighbours, RefuseWhatIsNoPlace) {
 TEST(Neighbours, AllPairs) {
   const double r = 0.01;
   const Case cases[] = {
-      {{0.3, 0.3, 0.3}, true, true, true, 800, r, r},            // many cells
-      {{0.3, 0.3, 0.3}, true, true, false, 800, r, r},           // open above
-      {{0.3, 0.3, 0.3}, false, false, false, 800, r, r},         // open
-      {{0.3, 0.3, 0.3}, true, true, true, 600, 0.1 * r, 2 * r},  // mixed
-      {{0.044, 0.066, 0.088}, true, true, true, 100, r, r},      // 2, 3 and 4 cells
-      {{0.042, 0.042, 0.042}, true, true, true, 40, r, r},       // the smallest box allowed
+      {{0.3, 0.3, 0.3}, true, true, true, 800, r, r},               // many cells
+      {{0.3, 0.3, 0.3}, true, true, false, 800, r, r},              // open above
+      {{0.3, 0.3, 0.3}, false, false, false, 800, r, r},            // open
+      {{0.3, 0.3, 0.3}, true, true, true, 600, 0.1 * r, 2 * r},     // 1:20
+      {{0.5, 0.5, 0.5}, true, true, false, 900, 0.05 * r, 5 * r},   // 1:100
+      {{0.3, 0.3, 0.3}, false, true, false, 900, 1e-5 * r, 2 * r},  // more than there are levels for
+      {{0.044, 0.066, 0.088}, true, true, true, 100, r, r},         // 2, 3 and 4 cells
+      {{0.042, 0.042, 0.042}, true, true, true, 40, r, r},          // the smallest box allowed
       {{0.042, 0.3, 1}, true, true, false, 500, 0.5 * r, r},
       {{1, 1, 1}, true, true, true, 30, r, r},  // more cells than grains
       {{0.1, 0.1, 0.1}, true, true, true, 1, r, r},
@@ -127,7 +130,7 @@ TEST(Neighbours, OneGrainFarOff) {
   grains[1] = {{0.05, 0.05, 0.029}, 0.01, {}, 0.01, {}, 0, {}, 0};
   grains[2] = {{0.05, 0.05, 1e12}, 0.01, {}, 0.01, {}, 0, {}, 0};
   Neighbours<Host> lists;
-  lists.build(Host{}, s, grains.data(), std::vector<BodyId>(3, BodyId::none).data(), 3, 0.01, 1e-3);
+  lists.build(Host{}, s, grains.data(), std::vector<BodyId>(3, BodyId::none).data(), 3, 1e-3);
   EXPECT_EQ(lists.total, 2);  // one pair, in both rows
 }
 

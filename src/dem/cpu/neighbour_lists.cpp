@@ -191,7 +191,7 @@ double least_gap(const Bed& bed, const WatchList& watched) {
 
 double find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const Control& control) {
   const BodyMotion& bodies = control.bodies;
-  grains.sort(space, bed.scene, bed.grain.data(), bed.n, 2 * bed.r_max + bed.margin);
+  grains.sort(space, bed.scene, bed.grain.data(), bed.n, bed.margin);
   for_each_chunk(space, bed, [&](Chunk& chunk) {
     find_pairs(bed, chunk, grains);
     find_plane_pairs(bed, chunk, bodies);

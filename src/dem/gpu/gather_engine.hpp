@@ -174,7 +174,7 @@ class GatherEngine final : public Engine {
   }
 
   void search(std::int64_t step) {
-    lists_.build(space_, view_.scene, grain_[step & 1].data(), part_of_.data(), n_, r_max_, view_.margin);
+    lists_.build(space_, view_.scene, grain_[step & 1].data(), part_of_.data(), n_, view_.margin);
     ++searches_;
   }
 
