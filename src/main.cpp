@@ -12,6 +12,7 @@
 #include "case/keys.hpp"
 #include "error.hpp"
 #include "memory.hpp"
+#include "run/grain_table.hpp"
 #include "run/run.hpp"
 #include "run/sweep.hpp"
 
@@ -25,8 +26,7 @@ constexpr std::string_view overview_text =
 constexpr std::string_view overview = overview_text.substr(1);  // without the first end of line
 
 // Those of the script ./moraine, see there.
-const std::vector<std::string> launcher_commands = {"watch", "figures",   "report",
-                                                    "till",  "reproduce", "test"};
+const std::vector<std::string> launcher_commands = {"watch", "figures", "report", "reproduce", "test"};
 
 std::string did_you_mean(const std::string& word, const std::vector<std::string>& known) {
   std::string near = cases::nearest(word, known);
@@ -153,6 +153,15 @@ int main(int argc, char** argv) {
   import->add_option("FILE", file, "binary file, version 1.03 to 2.15")->required();
   import->add_option("CASE", directory, "directory to create")->required();
 
+  CLI::App* exporting = app.add_subcommand("export", "write the grains of a case as others read them");
+  std::string format = "csv", target;
+  exporting->add_option("CASE", options.directory, "directory that holds results")->required();
+  exporting
+      ->add_option("--format", format, "csv: a table, also to start a case with; lammps: a data file; vtk")
+      ->check(CLI::IsMember({"csv", "lammps", "vtk"}))
+      ->capture_default_str();
+  exporting->add_option("--output", target, "file to write; without it the screen");
+
   // 3. Do it, or say in one line why not.
   if (argc == 1) {
     std::cout << overview;
@@ -178,6 +187,7 @@ int main(int argc, char** argv) {
     if (*check) run::check_case(options);
     if (*keys) std::cout << cases::reference(about);
     if (*bench) run::bench_case(options, stage, steps);
+    if (*exporting) run::export_grains(options.directory, format, target);
     if (*import) cases::import_sphere(file, directory);
   } catch (const std::exception& e) {
     std::cerr << "moraine: " << in_words(e) << "\n";

@@ -72,11 +72,17 @@ void check_case(const Entries& entries) {
   const Reader c(entries);
   c.expect(c.number("contact.mu_d") <= c.number("contact.mu_s"), "contact.mu_d",
            "at most contact.mu_s = ", c.number("contact.mu_s"));
-  if (c.text("grains.distribution") == "uniform") {
-    c.expect(c.number("grains.radius_min") > 0, "grains.radius_min", "> 0 m for uniform radii");
-    c.expect(c.number("grains.radius_max") >= c.number("grains.radius_min"), "grains.radius_max",
-             "at least grains.radius_min = ", c.number("grains.radius_min"));
+  const string radii = c.text("grains.distribution");
+  const double r_min = c.number("grains.radius_min"), r_max = c.number("grains.radius_max");
+  if (radii == "uniform" || radii == "fractal") {
+    c.expect(r_min > 0, "grains.radius_min", "> 0 m for ", radii, " radii");
+    c.expect(r_max >= r_min, "grains.radius_max", "at least grains.radius_min = ", r_min);
+  } else if (radii == "lognormal") {
+    c.expect(r_max == 0 || r_max >= r_min, "grains.radius_max",
+             "0 m, or at least grains.radius_min = ", r_min);
   }
+  c.expect((radii == "sieves") == !c.text("grains.sieves").empty(), "grains.sieves",
+           radii == "sieves" ? "the name of a CSV file" : "\"\", or grains.distribution = \"sieves\"");
   c.expect(c.number("fluid.porosity_min") < c.number("fluid.porosity_max"), "fluid.porosity_min",
            "less than fluid.porosity_max = ", c.number("fluid.porosity_max"));
   c.expect(c.number("fluid.porosity_max") < 1, "fluid.porosity_max", "less than 1");
@@ -197,13 +203,25 @@ fs::path start_file(const fs::path& directory, const Entry& entry) {
   }
   if (!fs::is_regular_file(path))
     throw error(entry.stated, ": there is no ", path.string(),
-                "; expected a finished case or a checkpoint, relative to ", directory.string());
+                "; expected a finished case, a checkpoint or a table of grains, relative to ",
+                directory.string());
+  return path;
+}
+
+// A file beside the case.
+fs::path file_beside(const fs::path& directory, const Entry& entry) {
+  const string name = std::get<string>(entry.value);
+  if (name.empty()) return {};
+  const fs::path path = (directory / name).lexically_normal();
+  if (!fs::is_regular_file(path))
+    throw error(entry.stated, ": there is no ", path.string(), "; expected a file, relative to ",
+                directory.string());
   return path;
 }
 
 // The kind of the last stage of the case that a start file comes from; empty where that is not known.
 string last_kind(const fs::path& start) {
-  if (start.empty()) return {};
+  if (start.empty() || start.extension() == ".csv") return {};
   try {
     const auto before = read_resolved(output::read_checkpoint(start).case_text);
     const auto kind = before.find("stage." + split(before.at("stages"), ", ").back() + ".kind");
@@ -266,6 +284,7 @@ Case load_checked(const fs::path& directory, const std::vector<Override>& overri
   c.wall.k_n = c.contact.k_n;
   check_case(draft.entries);
   c.start = start_file(directory, draft.entries.at("start"));
+  c.grains.sieves = file_beside(directory, draft.entries.at("grains.sieves"));
 
   if (draft.stages.empty()) throw error(file, ": no stages; expected at least one [[stage]]");
   string kind_before = last_kind(c.start);
@@ -331,9 +350,10 @@ string extension_text(const fs::path& directory, const std::vector<Override>& ov
   };
   keep_overrides(draft.entries);
   // A path keeps its meaning in the other directory.
-  if (const auto start = draft.entries.find("start"); start != draft.entries.end())
-    if (auto& path = std::get<string>(start->second.value); !path.empty())
-      path = (fs::path(base) / path).lexically_normal().string();
+  for (const char* key : {"start", "grains.sieves"})
+    if (const auto entry = draft.entries.find(key); entry != draft.entries.end())
+      if (auto& path = std::get<string>(entry->second.value); !path.empty())
+        path = (fs::path(base) / path).lexically_normal().string();
   std::vector<string> stages;
   for (StageDraft& stage : draft.stages) {
     stages.push_back(stage.name);

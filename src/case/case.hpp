@@ -13,10 +13,14 @@ namespace moraine::cases {
 
 struct Grains {
   std::int64_t count;
-  std::string distribution;       // "lognormal", "uniform"
+  std::string distribution;       // "lognormal", "uniform", "fractal", "sieves"
   double radius_mean;             // m
   double radius_std;              // m, lognormal
-  double radius_min, radius_max;  // m, uniform
+  double radius_min, radius_max;  // m, uniform, fractal; limits of lognormal, 0: none
+  double fractal_dimension;       // fractal
+  std::filesystem::path sieves;   // a table of sizes and what is finer
+  std::string placement;          // "lattice", "random"
+  double solid_fraction;          // random
   double density;                 // kg/m3
   std::uint64_t seed;
   std::int64_t columns_x, columns_y;  // of the starting lattice

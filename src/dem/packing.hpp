@@ -1,33 +1,38 @@
-// Grains to begin with: one in each cell of a loose lattice, placed at random in it (Damsgaard et al. 2013,
-// par. 26).
+// Grains to begin with, none of which touch: one in each cell of a loose lattice, placed at random in it
+// (Damsgaard et al. 2013, par. 26); or all at random places, the largest first.
 #pragma once
 #include <cstdint>
 
+#include "dem/grading.hpp"
 #include "dem/state.hpp"
 
 namespace moraine::dem {
 
 struct Packing {
-  enum class Distribution { lognormal, uniform };
+  enum class Distribution { lognormal, uniform, ranges };
+  enum class Placement { lattice, random };
   std::int64_t count = 10000;
   Distribution distribution = Distribution::lognormal;
   double radius_mean = 0.02, radius_std = 9.38e-5;  // m, lognormal
-  double radius_min = 0.02, radius_max = 0.02;      // m, uniform
+  double radius_min = 0, radius_max = 0;            // m, uniform; lognormal: what lies outside is drawn again
+  std::vector<SizeRange> ranges;                    // of ranges
   std::uint64_t seed = 1;
-  std::int64_t columns_x = 10, columns_y = 10;
-  double cell = 2.1;            // height of a lattice cell in largest diameters
-  double box_x = 0, box_y = 0;  // m; 0: columns times that height, too
+  Placement placement = Placement::lattice;
+  std::int64_t columns_x = 10, columns_y = 10;  // lattice
+  double cell = 2.1;                            // lattice: height of a cell in largest diameters
+  double solid_fraction = 0.25;                 // random: of the box up to the height that they fill
+  double box_x = 0, box_y = 0;                  // m; 0: columns times the height of a cell
+  bool periodic_x = true, periodic_y = true;
 };
 
-struct Lattice {
-  State state;          // at rest, ids in the order of the lattice
+struct LooseGrains {
+  State state;          // at rest
   double box_x, box_y;  // m
-  double cell;          // m
+  double cell;          // m, of the lattice; random: as wide as that of grains of the mean volume
 };
 
-// The same grains for the same numbers, wherever it runs. Throws Error where the grains do not fit into their
-// cells.
-Lattice make_lattice(const Packing& packing);
+// The same grains for the same numbers, wherever it runs. Throws Error where the grains do not fit.
+LooseGrains make_loose_grains(const Packing& packing);
 
 // A state of n grains at rest, all arrays of the right length.
 State grains_at_rest(std::vector<double> r, std::vector<Vec3d> x);

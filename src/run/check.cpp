@@ -6,6 +6,7 @@
 #include <string>
 
 #include "case/keys.hpp"
+#include "dem/grading.hpp"
 #include "dem/spectrum.hpp"
 #include "error.hpp"
 #include "run/estimate.hpp"
@@ -86,6 +87,14 @@ void check_case(const Options& options) {
   std::printf(
       "  grains        %.0f, mean diameter %.4g m, box %.4g x %.4g m, bed about %.3g m (porosity 0.4)\n", n,
       diameter, start.box_x, start.box_y, settled);
+  const dem::GradingSummary sizes = dem::summary_of(state.r);
+  if (sizes.largest > 1.5 * sizes.smallest)
+    std::printf(
+        "  sizes         %.4g to %.4g m (1:%.3g), by mass D10 %.4g, D50 %.4g, D60 %.4g, D90 %.4g m; Sauter "
+        "mean "
+        "%.4g m\n",
+        sizes.smallest, sizes.largest, sizes.largest / sizes.smallest, sizes.d10, sizes.d50, sizes.d60,
+        sizes.d90, sizes.sauter);
   std::printf("  memory        about %.0f MB\n", bytes_needed(n, c.has_water()) / 1e6);
 
   if (c.preset != "none" || c.softening != 1) {

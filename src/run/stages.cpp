@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "case/csv.hpp"
 #include "dem/engine.hpp"
 #include "dem/memory_order.hpp"
 #include "dem/observe.hpp"
 #include "dem/packing.hpp"
 #include "error.hpp"
 #include "output/sealed.hpp"
+#include "run/grain_table.hpp"
 #include "run/needs.hpp"
 #include "run/schedule.hpp"
 
@@ -116,7 +118,31 @@ static double step_of(const cases::Case& c, const cases::Stage& stage, const dem
   return c.dt > 0 ? c.dt : step_by_eq_9(scene, s, stage.f);
 }
 
+// A table of sieves. Errors name file and line.
+static std::vector<dem::Sieve> sieves_in(const std::filesystem::path& file) {
+  const cases::CsvTable table(file);
+  table.expect_only({"size", "finer"});
+  const std::vector<double> size = table.column("size", "m"), finer = table.column("finer", "1");
+  std::vector<dem::Sieve> sieves;
+  for (std::size_t k = 0; k < size.size(); ++k) sieves.push_back({size[k], finer[k]});
+  try {
+    dem::ranges_of(sieves);
+  } catch (const Error& why) {
+    throw error(file.string(), ": ", why.what());
+  }
+  return sieves;
+}
+
 Start start_of(const cases::Case& c) {
+  if (is_grain_table(c.start)) {
+    Start s{{}, c.box_x, c.box_y, c.box_z, 0};
+    s.before.state = read_grain_table(c);
+    double volume = 0;
+    for (const double r : s.before.state.r) volume += r * r * r;
+    const double n = s.before.state.size();
+    s.wall_mass = default_wall_mass(c, n, c.grains.cell * 2 * std::cbrt(volume / n));
+    return s;
+  }
   if (!c.start.empty()) {
     Start s{read_start(c.start), c.box_x, c.box_y, c.box_z, 0};
     if (!s.before.finished)
@@ -138,16 +164,21 @@ Start start_of(const cases::Case& c) {
   const cases::Grains& g = c.grains;
   dem::Packing p;
   p.count = g.count;
-  p.distribution = g.distribution == "uniform" ? dem::Packing::Distribution::uniform
-                                               : dem::Packing::Distribution::lognormal;
+  using Distribution = dem::Packing::Distribution;
+  p.distribution = g.distribution == "uniform"     ? Distribution::uniform
+                   : g.distribution == "lognormal" ? Distribution::lognormal
+                                                   : Distribution::ranges;
+  if (g.distribution == "fractal") p.ranges = {{g.radius_min, g.radius_max, g.fractal_dimension, 1}};
+  if (g.distribution == "sieves") p.ranges = dem::ranges_of(sieves_in(g.sieves));
+  if (g.placement == "random") p.placement = dem::Packing::Placement::random;
+  p.solid_fraction = g.solid_fraction, p.periodic_x = c.periodic_x, p.periodic_y = c.periodic_y;
   p.radius_mean = g.radius_mean, p.radius_std = g.radius_std;
   p.radius_min = g.radius_min, p.radius_max = g.radius_max;
   p.seed = g.seed, p.columns_x = g.columns_x, p.columns_y = g.columns_y, p.cell = g.cell;
   p.box_x = c.box_x, p.box_y = c.box_y;
-  dem::Lattice lattice = dem::make_lattice(p);
-  Start s{
-      {}, lattice.box_x, lattice.box_y, c.box_z, default_wall_mass(c, lattice.state.size(), lattice.cell)};
-  s.before.state = std::move(lattice.state);
+  dem::LooseGrains loose = dem::make_loose_grains(p);
+  Start s{{}, loose.box_x, loose.box_y, c.box_z, default_wall_mass(c, loose.state.size(), loose.cell)};
+  s.before.state = std::move(loose.state);
   return s;
 }
 

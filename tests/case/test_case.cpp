@@ -372,9 +372,10 @@ TEST_F(CaseTest, wrong_values_say_what_was_expected) {
   EXPECT_EQ(fault_of("[grains]\ncount = 1.5\n"), "x/case.toml:2: grains.count = 1.5: expected an integer");
   EXPECT_EQ(fault_of("[grains]\ncount = \"1\"\n"),
             "x/case.toml:2: grains.count = \"1\": expected an integer");
-  EXPECT_EQ(fault_of("[grains]\ndistribution = \"log-normal\"\n"),
-            "x/case.toml:2: grains.distribution = \"log-normal\": expected lognormal | uniform; did you mean "
-            "lognormal?");
+  EXPECT_EQ(
+      fault_of("[grains]\ndistribution = \"log-normal\"\n"),
+      "x/case.toml:2: grains.distribution = \"log-normal\": expected lognormal | uniform | fractal | sieves; "
+      "did you mean lognormal?");
   EXPECT_EQ(fault_of("[box]\nfloor = 1\n"), "x/case.toml:2: box.floor = 1: expected true or false");
   EXPECT_EQ(fault_of("title = 1\n"), "x/case.toml:1: title = 1: expected a text in quotes");
   EXPECT_EQ(fault_of("model = 1\n"), "x/case.toml:1: model = 1: expected a table, [model]");
@@ -392,10 +393,10 @@ TEST_F(CaseTest, missing_files) {
   EXPECT_EQ(
       fault_of("extends = \"../nowhere\"\n"),
       "x/case.toml:1: extends = \"../nowhere\": expected a directory that holds a case.toml, relative to x");
-  EXPECT_EQ(
-      fault_of("start = \"../nowhere\"\n" + shear),
-      "x/case.toml:1: start = \"../nowhere\": there is no nowhere; expected a finished case or a checkpoint, "
-      "relative to x");
+  EXPECT_EQ(fault_of("start = \"../nowhere\"\n" + shear),
+            "x/case.toml:1: start = \"../nowhere\": there is no nowhere; expected a finished case, a "
+            "checkpoint or a table of "
+            "grains, relative to x");
   write(settle, "bed");
   EXPECT_EQ(fault_of("start = \"../bed\"\n" + shear),
             "x/case.toml:1: start = \"../bed\": there is no bed/output/checkpoint.h5; run that case first: "

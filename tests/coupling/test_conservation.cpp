@@ -122,7 +122,7 @@ TEST(OneGrain, InHydrostaticWaterIsBuoyant) {
   bed.scene.gravity = 9.8, bed.scene.dt = 1e-5, bed.scene.fluid_density = 1000;
   bed.scene.box = {0.2, 0.2, 1};
   bed.scene.periodic_x = bed.scene.periodic_y = true;
-  bed.state = dem::make_lattice({.count = 1, .radius_mean = 0.01, .radius_std = 0}).state;
+  bed.state = dem::make_loose_grains({.count = 1, .radius_mean = 0.01, .radius_std = 0}).state;
   bed.state.x[0] = {0.1, 0.1, 0.5};
   const auto engine = dem::make_engine(dem::Backend::cpu, 1);
   State s = dem::run(*engine, bed.scene, bed.state, 1000);
@@ -139,7 +139,7 @@ TEST(LinearPressure, PushesAGrainAlikeWhereverItIs) {
       bed.scene = dem::empty_space(1e5);
       bed.scene.gravity = 0, bed.scene.dt = 1e-6, bed.scene.box = {0.2, 0.2, 1};
       bed.scene.periodic_x = bed.scene.periodic_y = true;
-      bed.state = dem::make_lattice({.count = 1, .radius_mean = 0.01, .radius_std = 0}).state;
+      bed.state = dem::make_loose_grains({.count = 1, .radius_mean = 0.01, .radius_std = 0}).state;
       bed.state.x[0] = {0.05 + at, 0.08 - at, 0.25 + at};
       Water w = water_over(bed, 0.5);
       w.closure = closure;

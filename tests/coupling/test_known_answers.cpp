@@ -35,7 +35,8 @@ struct Column {
     s.body(dem::BodyId::top_wall) = dem::wall_pressed_by(sigma_0, 1);
     State& state = bed.state;
     state =
-        dem::make_lattice({.count = columns * columns * layers, .radius_mean = d / 2, .radius_std = 0}).state;
+        dem::make_loose_grains({.count = columns * columns * layers, .radius_mean = d / 2, .radius_std = 0})
+            .state;
     for (dem::Index i = 0; i < state.size(); ++i) {
       const int layer = i / (columns * columns), at = i % (columns * columns);
       state.x[i] = {(at % columns + 0.5) * d, (at / columns + 0.5) * d,

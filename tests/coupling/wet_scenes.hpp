@@ -111,7 +111,7 @@ inline WetBed make_bed(int count, int columns, double normal_stress, double boul
   dem::Packing p;
   p.count = count, p.columns_x = p.columns_y = columns;
   p.radius_mean = 0.01, p.radius_std = 0.0008, p.cell = 1.05, p.seed = 5;
-  const dem::Lattice lattice = dem::make_lattice(p);
+  const dem::LooseGrains lattice = dem::make_loose_grains(p);
   WetBed bed;
   Scene& s = bed.scene;
   s.box = {lattice.box_x, lattice.box_y, 1};

@@ -11,7 +11,7 @@ double largest(const std::vector<double>& r) { return *std::max_element(r.begin(
 
 TEST(Packing, Radii) {
   Packing p;  // mean 0.02, deviation 9.38e-5, 10000 grains
-  const std::vector<double> r = make_lattice(p).state.r;
+  const std::vector<double> r = make_loose_grains(p).state.r;
   double mean = 0, log_mean = 0, variance = 0, skew = 0;
   const double n = static_cast<double>(r.size());
   for (const double x : r) mean += x / n, log_mean += std::log(x) / n;
@@ -28,7 +28,7 @@ TEST(Packing, Radii) {
   p.distribution = Packing::Distribution::uniform;
   p.radius_min = 0.01, p.radius_max = 0.03;
   double sum = 0, sum2 = 0;
-  for (const double x : make_lattice(p).state.r) {
+  for (const double x : make_loose_grains(p).state.r) {
     EXPECT_TRUE(x >= 0.01 && x <= 0.03) << x;
     sum += x / n, sum2 += x * x / n;
   }
@@ -39,7 +39,7 @@ TEST(Packing, Radii) {
 
 TEST(Packing, BoxOfTheDefaults) {
   Packing p;
-  const Lattice l = make_lattice(p);
+  const LooseGrains l = make_loose_grains(p);
   EXPECT_DOUBLE_EQ(l.cell, 2.1 * 2 * largest(l.state.r));
   EXPECT_DOUBLE_EQ(l.box_x, 10 * l.cell);
   EXPECT_NEAR(l.box_x, 0.86, 0.005);
@@ -52,10 +52,10 @@ TEST(Packing, BoxOfTheDefaults) {
 TEST(Packing, SameSeedSameGrains) {
   Packing p;
   p.count = 500;
-  const Lattice a = make_lattice(p), b = make_lattice(p);
+  const LooseGrains a = make_loose_grains(p), b = make_loose_grains(p);
   expect_same_bits(a.state, b.state);
   p.seed = 2;
-  const Lattice c = make_lattice(p);
+  const LooseGrains c = make_loose_grains(p);
   EXPECT_NE(a.state.r, c.state.r);
   EXPECT_NE(a.state.x, c.state.x);
 }
@@ -66,7 +66,7 @@ TEST(Packing, NoOverlaps) {
     Packing p;
     p.count = 300, p.columns_x = 4, p.columns_y = 6, p.cell = cell;
     p.distribution = Packing::Distribution::uniform, p.radius_min = 0.005, p.radius_max = 0.02;
-    const Lattice l = make_lattice(p);
+    const LooseGrains l = make_loose_grains(p);
     const State& s = l.state;
     for (Index i = 0; i < s.size(); ++i) {
       EXPECT_GE(s.x[i].z, s.r[i]);
@@ -82,14 +82,67 @@ TEST(Packing, NoOverlaps) {
 TEST(Packing, RefusesCellsThatAreTooSmall) {
   Packing p;
   p.count = 100, p.cell = 1.0;
-  EXPECT_THROW(make_lattice(p), Error);
+  EXPECT_THROW(make_loose_grains(p), Error);
   p.cell = 2.1, p.box_x = 0.3;  // ten columns of 0.04 m grains
   try {
-    make_lattice(p);
+    make_loose_grains(p);
     FAIL();
   } catch (const Error& e) {
     EXPECT_NE(std::string(e.what()).find("overlap at the start"), std::string::npos) << e.what();
   }
+}
+
+// At random places none touch, also across periodic sides, and all are inside.
+TEST(Packing, RandomPlacesAreFree) {
+  for (const bool periodic : {true, false}) {
+    Packing p;
+    p.count = 3000, p.placement = Packing::Placement::random;
+    p.distribution = Packing::Distribution::ranges, p.ranges = {{0.001, 0.02, 2.6, 1}};  // 1:20
+    p.box_x = 0.12, p.box_y = 0.1, p.periodic_x = p.periodic_y = periodic;
+    const LooseGrains l = make_loose_grains(p);
+    ASSERT_EQ(l.state.size(), 3000);
+    double volume = 0, height = 0;
+    for (Index i = 0; i < l.state.size(); ++i) {
+      const Vec3d& x = l.state.x[i];
+      const double r = l.state.r[i];
+      volume += sphere_volume(r), height = std::max(height, x.z + r);
+      EXPECT_GT(x.z, r);
+      if (!periodic) {
+        EXPECT_GT(x.x, r);
+        EXPECT_LT(x.x, 0.12 - r);
+        EXPECT_GT(x.y, r);
+        EXPECT_LT(x.y, 0.1 - r);
+      }
+      for (Index j = 0; j < i; ++j) {
+        Vec3d d = x - l.state.x[j];
+        if (periodic) d.x -= 0.12 * std::round(d.x / 0.12), d.y -= 0.1 * std::round(d.y / 0.1);
+        ASSERT_GT(dot(d, d), std::pow(r + l.state.r[j], 2)) << i << ' ' << j;
+      }
+    }
+    EXPECT_NEAR(volume / (0.12 * 0.1 * height), 0.25, 0.02);
+    EXPECT_EQ(make_loose_grains(p).state.x, l.state.x);
+    p.seed = 2;
+    EXPECT_NE(make_loose_grains(p).state.x, l.state.x);
+  }
+}
+
+TEST(Packing, RandomPlacesMayRunOut) {
+  Packing p;
+  p.count = 2000, p.placement = Packing::Placement::random, p.solid_fraction = 0.6;
+  p.box_x = p.box_y = 0.5;
+  EXPECT_THROW(make_loose_grains(p), Error);
+  p.box_x = 0;
+  EXPECT_THROW(make_loose_grains(p), Error);
+}
+
+TEST(Packing, LimitsOfLognormalRadii) {
+  Packing p;
+  p.count = 5000, p.radius_mean = 0.02, p.radius_std = 0.01, p.radius_min = 0.015, p.radius_max = 0.03;
+  const std::vector<double> r = make_loose_grains(p).state.r;
+  EXPECT_GE(*std::min_element(r.begin(), r.end()), 0.015);
+  EXPECT_LE(*std::max_element(r.begin(), r.end()), 0.03);
+  p.radius_min = 1, p.radius_max = 2;
+  EXPECT_THROW(make_loose_grains(p), Error);
 }
 
 }  // namespace

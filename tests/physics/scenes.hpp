@@ -83,7 +83,7 @@ inline Bed bed_after(std::int64_t steps, double margin = 0) {
   Packing p;
   p.count = 300, p.columns_x = p.columns_y = 5;
   p.radius_mean = 0.01, p.radius_std = 0.0005, p.cell = 1.06, p.seed = 3;
-  const Lattice lattice = make_lattice(p);
+  const LooseGrains lattice = make_loose_grains(p);
   Scene s;
   s.box = {lattice.box_x, lattice.box_y, 1};
   s.contact.fill(LinearContact{1e5, 1e5, 20, 8, 0.5, 0.5});
@@ -140,7 +140,7 @@ inline Bed column_between_walls(Index count, int columns, double wall_mu, std::i
   Packing p;
   p.count = count, p.columns_x = p.columns_y = columns;
   p.radius_mean = 0.01, p.radius_std = 0.0005, p.cell = 1.06, p.seed = 3;
-  const Lattice lattice = make_lattice(p);
+  const LooseGrains lattice = make_loose_grains(p);
   Bed bed{{}, lattice.state};
   Scene& s = bed.scene;
   s.box = {lattice.box_x, lattice.box_y, 1};

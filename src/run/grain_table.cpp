@@ -1,0 +1,178 @@
+#include "run/grain_table.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+
+#include "case/csv.hpp"
+#include "dem/observe.hpp"
+#include "dem/packing.hpp"
+#include "dem/touching.hpp"
+#include "error.hpp"
+#include "output/files.hpp"
+
+namespace moraine::run {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+const std::vector<std::string> velocities = {"vx", "vy", "vz"}, spins = {"wx", "wy", "wz"};
+
+void expect_inside(const cases::Case& c, const cases::CsvTable& table, const dem::State& s) {
+  const double side[3] = {c.box_x, c.box_y, c.box_z};
+  const bool periodic[3] = {c.periodic_x, c.periodic_y, c.periodic_z};
+  const bool walls[3] = {c.walls_x, c.walls_y, c.floor};
+  for (dem::Index i = 0; i < s.size(); ++i)
+    for (int a = 0; a < 3; ++a) {
+      if (periodic[a] || !walls[a]) continue;
+      const double deepest = c.guards.max_overlap * s.r[i];
+      const double below = s.r[i] - s.x[i][a], above = a < 2 ? s.x[i][a] + s.r[i] - side[a] : below;
+      const double out = std::max(below, above);
+      if (out > deepest)
+        throw error(table.at(i), ": the grain at ", "xyz"[a], " = ", s.x[i][a], " m with r = ", s.r[i],
+                    " m is ", out, " m beyond ", a == 2 ? "the floor" : "a side wall", "; expected at most ",
+                    deepest, " m (guards.max_overlap)");
+    }
+}
+
+void expect_apart(const cases::Case& c, const cases::CsvTable& table, const dem::State& s) {
+  dem::Scene scene;
+  scene.box = {c.box_x, c.box_y, c.box_z};
+  scene.periodic_x = c.periodic_x, scene.periodic_y = c.periodic_y, scene.periodic_z = c.periodic_z;
+  std::vector<dem::GrainRow> rows(s.size(), dem::GrainRow{});
+  for (dem::Index i = 0; i < s.size(); ++i) rows[i].x = s.x[i], rows[i].r = rows[i].r_again = s.r[i];
+  dem::TouchingPairs().each(scene, rows.data(), s.size(), [&](dem::Index i, dem::Index j, double overlap) {
+    const double smaller = std::min(s.r[i], s.r[j]);
+    if (overlap <= c.guards.max_overlap * smaller) return;
+    throw error(table.at(std::min(i, j)), ": this grain overlaps that of ", table.at(std::max(i, j)), " by ",
+                overlap, " m, ", overlap / smaller, " of the smaller radius; expected at most ",
+                c.guards.max_overlap, " (guards.max_overlap)");
+  });
+}
+
+std::string digits(double x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.17g", x);
+  return text;
+}
+
+using Line = std::initializer_list<double>;
+void add(std::ostream& out, const Line& numbers, const char* between) {
+  const char* before = "";
+  for (const double x : numbers) out << before << digits(x), before = between;
+  out << "\n";
+}
+
+void write_csv(std::ostream& out, const dem::State& s, const std::vector<dem::Vec3d>& v) {
+  out << "# m, m/s, rad/s\nid, x, y, z, r, vx, vy, vz, wx, wy, wz\n";
+  for (dem::Index i = 0; i < s.size(); ++i) {
+    const dem::Vec3d &x = s.x[i], &w = s.omega[i];
+    add(out, {double(s.id[i]), x.x, x.y, x.z, s.r[i], v[i].x, v[i].y, v[i].z, w.x, w.y, w.z}, ", ");
+  }
+}
+
+void write_lammps(std::ostream& out, const dem::Scene& scene, const dem::State& s,
+                  const std::vector<dem::Vec3d>& v) {
+  dem::Vec3d low{0, 0, 0}, high = scene.box;
+  for (int a = 0; a < 3; ++a)
+    for (dem::Index i = 0; i < s.size(); ++i)
+      if (dem::Sides::of(scene).side[a] == 0)
+        low[a] = std::min(low[a], s.x[i][a] - s.r[i]), high[a] = std::max(high[a], s.x[i][a] + s.r[i]);
+  out << "# atom_style sphere, SI units\n\n" << s.size() << " atoms\n1 atom types\n\n";
+  for (int a = 0; a < 3; ++a)
+    out << digits(low[a]) << " " << digits(high[a]) << " "
+        << "xyz"[a] << "lo "
+        << "xyz"[a] << "hi\n";
+  out << "\nAtoms # sphere\n\n";
+  for (dem::Index i = 0; i < s.size(); ++i) {
+    out << s.id[i] + 1 << " 1 ";
+    add(out, {2 * s.r[i], scene.density, s.x[i].x, s.x[i].y, s.x[i].z}, " ");
+  }
+  out << "\nVelocities\n\n";
+  for (dem::Index i = 0; i < s.size(); ++i) {
+    out << s.id[i] + 1 << " ";
+    add(out, {v[i].x, v[i].y, v[i].z, s.omega[i].x, s.omega[i].y, s.omega[i].z}, " ");
+  }
+}
+
+void write_vtk(std::ostream& out, const dem::State& s, const std::vector<dem::Vec3d>& v) {
+  out << "# vtk DataFile Version 3.0\ngrains, SI units\nASCII\nDATASET POLYDATA\nPOINTS " << s.size()
+      << " double\n";
+  for (const dem::Vec3d& x : s.x) add(out, {x.x, x.y, x.z}, " ");
+  out << "VERTICES " << s.size() << " " << 2 * s.size() << "\n";
+  for (dem::Index i = 0; i < s.size(); ++i) out << "1 " << i << "\n";
+  out << "POINT_DATA " << s.size() << "\nSCALARS radius double 1\nLOOKUP_TABLE default\n";
+  for (const double r : s.r) out << digits(r) << "\n";
+  out << "VECTORS velocity double\n";
+  for (const dem::Vec3d& u : v) add(out, {u.x, u.y, u.z}, " ");
+  out << "VECTORS spin double\n";
+  for (const dem::Vec3d& w : s.omega) add(out, {w.x, w.y, w.z}, " ");
+}
+
+}  // namespace
+
+bool is_grain_table(const fs::path& start) { return start.extension() == ".csv"; }
+
+dem::State read_grain_table(const cases::Case& c) {
+  const cases::CsvTable table(c.start);
+  table.expect_only({"id", "x", "y", "z", "r", "vx", "vy", "vz", "wx", "wy", "wz"});
+  for (int a = 0; a < 2; ++a)
+    if (!((a == 0 ? c.box_x : c.box_y) > 0))
+      throw error(c.start.string(), ": a table of grains has no box; expected box.", "xy"[a],
+                  " of more than 0 m");
+  std::vector<dem::Vec3d> x(table.rows());
+  const std::string axes[3] = {"x", "y", "z"};
+  for (int a = 0; a < 3; ++a) {
+    const std::vector<double> values = table.column(axes[a], "m");
+    for (std::size_t i = 0; i < x.size(); ++i) x[i][a] = values[i];
+  }
+  std::vector<double> r = table.column("r", "m");
+  for (std::size_t i = 0; i < r.size(); ++i)
+    if (!(r[i] > 0)) throw error(table.at(i), ": r = ", r[i], " m; expected more than 0");
+  dem::State s = dem::grains_at_rest(std::move(r), std::move(x));
+  const auto vector = [&](const std::vector<std::string>& names, const char* unit,
+                          std::vector<dem::Vec3d>& to) {
+    for (int a = 0; a < 3; ++a) {
+      if (!table.has(names[a])) continue;
+      const std::vector<double> values = table.column(names[a], unit);
+      for (std::size_t i = 0; i < values.size(); ++i) to[i][a] = values[i];
+    }
+  };
+  vector(velocities, "m/s", s.v), vector(spins, "rad/s", s.omega);
+  expect_inside(c, table, s);
+  expect_apart(c, table, s);
+  return s;
+}
+
+void export_grains(const fs::path& case_directory, const std::string& format, const fs::path& file) {
+  const fs::path checkpoint = case_directory / "output/checkpoint.h5";
+  if (!fs::exists(checkpoint))
+    throw error(case_directory.string(), ": has no results yet; run it first: moraine run ",
+                case_directory.string());
+  output::Checkpoint c = output::read_checkpoint(checkpoint);
+  const std::vector<dem::Vec3d> v = dem::velocity(c.scene, c.state);
+  // By their ids, whatever the order in memory.
+  std::vector<dem::Index> order(c.state.size());
+  for (dem::Index i = 0; i < c.state.size(); ++i) order[c.state.id[i]] = i;
+  dem::State s;
+  std::vector<dem::Vec3d> sorted;
+  for (const dem::Index i : order) {
+    s.id.push_back(c.state.id[i]), s.r.push_back(c.state.r[i]), s.x.push_back(c.state.x[i]);
+    s.omega.push_back(c.state.omega[i]), sorted.push_back(v[i]);
+  }
+  std::ostringstream text;
+  if (format == "csv") write_csv(text, s, sorted);
+  if (format == "lammps") write_lammps(text, c.scene, s, sorted);
+  if (format == "vtk") write_vtk(text, s, sorted);
+  if (file.empty()) {
+    std::cout << text.str();
+    return;
+  }
+  if (fs::exists(file)) throw error(file.string(), ": is there already; choose another name or remove it");
+  output::write_text(file, text.str());
+}
+
+}  // namespace moraine::run

@@ -1,0 +1,97 @@
+// Radii against the gradings that they are drawn from.
+#include "dem/grading.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "error.hpp"
+
+namespace moraine::dem {
+namespace {
+
+// Share of the mass that is finer than a sieve.
+double finer(const std::vector<double>& r, double size) {
+  double below = 0, all = 0;
+  for (const double radius : r) {
+    all += radius * radius * radius;
+    if (2 * radius < size) below += radius * radius * radius;
+  }
+  return below / all;
+}
+
+const std::vector<Sieve> till = {{0.5e-3, 0}, {1e-3, 0.2}, {2e-3, 0.5}, {4e-3, 0.55}, {10e-3, 1}};
+
+TEST(Grading, PassesItsSieves) {
+  Random random(3);
+  const std::vector<double> r = draw_radii(ranges_of(till), 200000, random);
+  ASSERT_EQ(r.size(), 200000u);
+  EXPECT_TRUE(std::is_sorted(r.rbegin(), r.rend()));
+  for (const Sieve& s : till) EXPECT_NEAR(finer(r, s.size), s.passing, 0.004) << s.size;
+  EXPECT_NEAR(finer(r, std::sqrt(2e-3 * 1e-3)), 0.35, 0.004);  // evenly over log size between two sieves
+  EXPECT_GE(2 * r.back(), 0.5e-3);
+  EXPECT_LE(2 * r.front(), 10e-3);
+}
+
+// Even of few grains: one comes from each n-th part of the distribution.
+TEST(Grading, FewGrainsPassThemToo) {
+  Random random(4);
+  const std::vector<double> r = draw_radii(ranges_of(till), 5000, random);
+  for (const Sieve& s : till) EXPECT_NEAR(finer(r, s.size), s.passing, 0.05) << s.size;
+}
+
+TEST(Grading, FractalNumbers) {
+  for (const double D : {0.5, 2.6, 3.0}) {
+    Random random(1);
+    const double low = 1e-3, high = 20e-3;
+    const std::vector<double> r = draw_radii({{low, high, D, 1}}, 100000, random);
+    for (const double at : {2e-3, 5e-3, 15e-3}) {
+      const auto larger = std::count_if(r.begin(), r.end(), [&](double x) { return x > at; });
+      const double expected =
+          (std::pow(at, -D) - std::pow(high, -D)) / (std::pow(low, -D) - std::pow(high, -D));
+      EXPECT_NEAR(larger / 1e5, expected, 2e-5) << D << ' ' << at;
+    }
+  }
+  // D = 3: the same mass in each class of sizes.
+  Random random(2);
+  const std::vector<double> r = draw_radii({{1e-3, 8e-3, 3, 1}}, 300000, random);
+  for (const int k : {1, 2}) EXPECT_NEAR(finer(r, 2 * 1e-3 * (1 << k)), k / 3.0, 0.01);
+}
+
+TEST(Grading, OneSize) {
+  Random random(1);
+  EXPECT_EQ(draw_radii({{0.01, 0.01, 2.6, 1}}, 3, random), (std::vector<double>{0.01, 0.01, 0.01}));
+}
+
+TEST(Grading, Summary) {
+  const GradingSummary s = summary_of({0.002, 0.001, 0.001, 0.004});  // volumes 8, 1, 1, 64
+  EXPECT_EQ(s.smallest, 0.002);
+  EXPECT_EQ(s.largest, 0.008);
+  EXPECT_EQ(s.d10, 0.004);  // 7.4 of 74
+  EXPECT_EQ(s.d50, 0.008);
+  EXPECT_EQ(s.d90, 0.008);
+  EXPECT_DOUBLE_EQ(s.mean, 0.004);
+  EXPECT_DOUBLE_EQ(s.sauter, 2 * 0.001 * 74 / 22);
+}
+
+void expect_refused(std::vector<Sieve> sieves, const char* words) {
+  try {
+    ranges_of(sieves);
+    ADD_FAILURE() << words;
+  } catch (const Error& e) {
+    EXPECT_NE(std::string(e.what()).find(words), std::string::npos) << e.what();
+  }
+}
+
+TEST(Grading, RefusesWhatIsNone) {
+  expect_refused({{1e-3, 0}}, "1 sieves; expected two or more");
+  expect_refused({{1e-3, 0}, {2e-3, 0.9}}, "the coarsest sieve, 0.002 m, has 90 % finer; expected 100");
+  expect_refused({{1e-3, 0.1}, {2e-3, 1}}, "the finest sieve, 0.001 m, has 10 % finer; expected 0");
+  expect_refused({{-1e-3, 0}, {2e-3, 1}}, "sieve 1: size -0.001 m; expected more than 0");
+  expect_refused({{1e-3, 0}, {2e-3, 0.6}, {3e-3, 0.5}, {4e-3, 1}}, "sieve 3");
+  expect_refused({{2e-3, 0}, {1e-3, 1}}, "sieve 2");
+  expect_refused({{1e-3, 0}, {2e-3, 1.2}}, "120 % finer; expected 0 to 100");
+}
+
+}  // namespace
+}  // namespace moraine::dem
