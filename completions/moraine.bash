@@ -4,14 +4,14 @@ _moraine() {
   root=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/..
   for ((i = 1; i < COMP_CWORD; ++i)); do
     case ${COMP_WORDS[i]} in
-      run | sweep | check | keys | bench | import-sphere | watch | figures | report | reproduce | test)
+      run | sweep | check | keys | bench | export | import-sphere | watch | figures | report | reproduce | test)
         command=${COMP_WORDS[i]}
         break
         ;;
     esac
   done
   case $command in
-    '') words="run sweep check keys bench import-sphere watch figures report reproduce test --help --version --cuda" ;;
+    '') words="run sweep check keys bench export import-sphere watch figures report reproduce test --help --version --cuda" ;;
     run) words="--resume --force --quiet --set --backend --threads --help" ;;
     sweep) words="--resume --force --quiet --set --at-once --backend --threads --help" ;;
     check) words="--set --backend --threads --help" ;;
@@ -20,15 +20,17 @@ _moraine() {
     figures) words="--output --format --only --help" ;;
     report) words="--output --notes --help" ;;
     reproduce) words="--preset --seeds --quick --set --settled --output --cores --gpu --dry-run --help" ;;
+    export) words="--format --output --help" ;;
     import-sphere | keys) words="--help" ;;
   esac
   case $previous in
     --backend) words="cpu cuda auto" ;;
     --preset) words="paper standard fast" ;;
-    --set | --at-once | --threads | --steps | --stage | --interval | --format | --only | --seeds | --cores | --settled) return ;;
+    --format) [[ $command == export ]] && words="csv lammps vtk" || return ;;
+    --set | --at-once | --threads | --steps | --stage | --interval | --only | --seeds | --cores | --settled) return ;;
   esac
   COMPREPLY=()
-  if [[ ! $command || $word == -* || $previous == @(--backend|--preset) ]]; then
+  if [[ ! $command || $word == -* || $previous == @(--backend|--preset|--format) ]]; then
     mapfile -t COMPREPLY < <(compgen -W "$words" -S ' ' -- "$word")
   elif [[ $command == import-sphere || $previous == @(--png|--output|--notes) ]]; then
     compopt -o filenames +o nospace
@@ -38,7 +40,7 @@ _moraine() {
       d=${d%/study.toml} d=${d##*/}
       [[ $d == '*' || $d != "$word"* ]] || COMPREPLY+=("$d ")
     done
-  elif [[ $command == @(run|sweep|check|bench|watch|figures|report) ]]; then  # directories with a case in them, and those on the way there
+  elif [[ $command == @(run|sweep|check|bench|export|watch|figures|report) ]]; then  # directories with a case in them, and those on the way there
     while read -r d; do
       if [[ -e $d/case.toml ]]; then
         COMPREPLY+=("$d ")

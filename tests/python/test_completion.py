@@ -26,6 +26,7 @@ def test_commands():
 
 @pytest.mark.parametrize("command, options", [
     ("run", "--resume --force --quiet --set --backend --threads --help"),
+    ("export", "--format --output --help"),
     ("watch", "--interval --once --time --png --no-png --help"),
     ("figures", "--output --format --only --help"),
     ("reproduce", "--preset --seeds --quick --set --settled --output --cores --gpu --dry-run --help"),
@@ -40,7 +41,8 @@ def test_cases():
 
 def test_values_of_options():
     assert complete("reproduce", "--preset", "") == ["paper", "standard", "fast"]
-    assert complete("watch", "--interval", "") == []
+    assert complete("watch", "--interval", "") == complete("figures", "--format", "") == []
+    assert complete("export", "--format", "") == ["csv", "lammps", "vtk"]
     assert complete("watch", "--png", "READ") == ["README.md"]
 
 
