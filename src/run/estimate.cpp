@@ -9,6 +9,7 @@
 #include "dem/memory_order.hpp"
 #include "dem/observe.hpp"
 #include "dem/packing.hpp"
+#include "error.hpp"
 #include "run/schedule.hpp"
 
 namespace moraine::run {
@@ -22,6 +23,8 @@ constexpr double slower = 1e-4;        // by which a step is shortened while it 
 constexpr double timed_for = 0.15;     // s, each bed
 constexpr double loosest = 0.42, squeeze = 0.99, dense = 6.5;  // porosity, of the height, contacts a grain
 constexpr int most_squeezes = 60;
+constexpr double widest =
+    4;  // largest over smallest grain: scattered evenly, small ones would lie within large ones
 constexpr int chunks = 9;  // of which the median counts, so that a busy moment does not
 
 // Contacts a grain: 3 to 5 at the end of settling (friction, damping), 5 consolidated; 3.7 to 4 in shear, 4.7
@@ -83,6 +86,10 @@ Estimate::Estimate(const cases::Case& c, const Start& start, dem::Engine& engine
 
 void Estimate::pack() {
   const std::vector<double>& r = start_.before.state.r;
+  const auto [smallest, largest] = std::minmax_element(r.begin(), r.end());
+  if (*largest > widest * *smallest)
+    throw error("sizes of 1:", std::round(*largest / *smallest),
+                " make no bed in a moment; moraine bench times steps of one that has settled");
   dem::Scene scene;
   scene.box = {start_.box_x, start_.box_y, 0};
   scene.density = case_.grains.density, scene.gravity = 0, scene.ledger = false;

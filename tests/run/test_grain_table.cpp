@@ -136,6 +136,7 @@ gamma_n = 1
 )");
   const std::string said = moraine({"check", c.string()}).out;
   EXPECT_NE(said.find("sizes         0.006"), std::string::npos) << said;
+  EXPECT_NE(said.find("make no bed in a moment; moraine bench times steps"), std::string::npos) << said;
   ASSERT_NO_FATAL_FAILURE(run(c));
   const dem::State s = output::read_checkpoint(c / "output/checkpoint.h5").state;
   EXPECT_GT(s.contacts.size(), 300u);
