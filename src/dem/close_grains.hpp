@@ -16,7 +16,9 @@ class CloseGrains {
   // Sorts them into cells; m, margin: that usually asked for. Throws Error if a coordinate is not finite.
   void sort(const Host& space, const Scene& scene, const GrainRow* grains, Index n, double margin) {
     cells_ = neighbours_.sort_into_cells(space, scene, grains, n, margin);
-    n_ = n;
+    start_.assign(1, 0);
+    for (std::int32_t c = 0; c < cells_->count; ++c)
+      start_.push_back(start_.back() + cells_->end[c] - cells_->first[c]);
     for (std::vector<double>* const list : {&x_, &y_, &z_, &r_})
       list->resize(n + Pack::width);  // to a full pack
     space.for_each(n, [&](std::int64_t k) {
@@ -37,10 +39,8 @@ class CloseGrains {
     const Pack r_and_margin(r + margin);
     const Sides& sides = cells_->levels.grid[0].sides;
     cells_->levels.runs_around(x, r + margin, [&](std::int32_t first_cell, std::int32_t last_cell) {
-      Index low = n_, end = 0;
-      for (std::int32_t c = first_cell; c <= last_cell; ++c)
-        if (cells_->first[c] < cells_->end[c]) low = std::min(low, cells_->first[c]), end = cells_->end[c];
-      for (Index k = std::max(low, from); k < end; k += Pack::width) {
+      const Index end = start_[last_cell + 1];
+      for (Index k = std::max(start_[first_cell], from); k < end; k += Pack::width) {
         const Vec3<Pack> d = nearest_image(sides, at - Vec3<Pack>{load(x_, k), load(y_, k), load(z_, k)});
         const Pack reach = r_and_margin + load(r_, k), distance2 = dot(d, d);
         const unsigned in_run = (1u << std::min(end - k, Index{Pack::width})) - 1;
@@ -61,7 +61,7 @@ class CloseGrains {
 
   Neighbours<Host> neighbours_;
   std::optional<Neighbours<Host>::Cells> cells_;
-  Index n_ = 0;
+  std::vector<Index> start_;           // of each cell in the order of cells, and of one after the last
   std::vector<double> x_, y_, z_, r_;  // m
 };
 

@@ -209,6 +209,7 @@ struct Neighbours {
   // Grains `order` by cell: those of cell c are order[first[c]] to order[end[c] - 1], by index.
   struct Cells {
     Levels levels;
+    std::int32_t count;
     const std::int32_t *order, *first, *end;
   };
   // Cells as wide as the grains of their level and the margin; good until the next call of this or of
@@ -223,7 +224,7 @@ struct Neighbours {
     space.sort_by_key(key_, order_, cells);
     space.for_each(cells, search::Clear{first_.data(), end_.data()});
     space.for_each(n, search::CellBounds{key_.data(), n, first_.data(), end_.data()});
-    return {levels, order_.data(), first_.data(), end_.data()};
+    return {levels, cells, order_.data(), first_.data(), end_.data()};
   }
 
  private:
