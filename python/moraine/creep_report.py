@@ -173,7 +173,9 @@ def overlay_figure(run, theirs):
                 ax.axvline(n * T, color="0.9", lw=0.5, zorder=0)
     axes[0, 0].set_ylabel("kPa"), axes[1, 0].set_ylabel("layer (m/s)"), axes[2, 0].set_ylabel("contacts per grain")
     axes[3, 0].set_ylabel("height over $H_0$")
-    axes[0, 1].legend(loc="upper right", fontsize=5.5), axes[2, 1].legend(loc="lower right")
+    axes[0, 1].legend(loc="upper right", fontsize=6), axes[2, 1].legend(loc="lower right")
+    low, high = axes[0, 0].get_ylim()
+    axes[0, 0].set_ylim(low, high + 0.4 * (high - low))  # room for the legend
     axes[2, 0].set_ylim(0), axes[1, 0].set_ylim(1e-6)
     figure.align_ylabels()
     for ax, letter in zip(axes.flat, "abcdefgh"):

@@ -94,7 +94,7 @@ class Run:
             "seed": self.seed, "closure": self.closure or "dry", "k_c_m2": self.k_c, "relative_rate": self.kind.relative_rate, "group": self.group,
             "sigma_0_kPa": self.sigma_0 / 1e3, "strain": rows["shear_strain"][-1], "peak": peak, "strain_at_peak": strain,
             "peak_raw": self.friction[1:].max(), "friction_late": self._late(self.friction),
-            "grain_friction_late": self._late(rows["shear_friction"]),
+            "effective_friction_late": self._late(rows["shear_stress"]) / (self.sigma_0 - self._late(pressure)),
             "lowest_pressure_kPa": pressure.min() / 1e3, "pressure_late_kPa": self._late(pressure) / 1e3,
             "dilation_d": self._late(rows["dilation_diameters"]), "porosity_0": shearing.porosity_0(rows),
             "height_0_m": shearing.height_0(rows), "hours": measure.hours(self.case),
@@ -145,8 +145,9 @@ def peak_table(kinds):
         for closure in closures:
             rows = kinds.get(Kind(closure, relative), [])
             verdict = ""
-            if rows and relative in published:
-                verdict = ": " + compare(values(rows, "peak").mean(), published[relative], further_run(values(rows, "peak")) + 0.005)
+            if rows and relative in published:  # by logarithms, for the scatter goes with the level
+                logarithms = np.log(values(rows, "peak"))
+                verdict = ": " + compare(logarithms.mean(), np.log(published[relative]), further_run(logarithms) + 0.005 / published[relative])
             line.append(shown(rows, "peak") + verdict)
         ours = values(kinds.get(Kind("full", relative), []), "peak")
         line += [f"{published[relative] / published[min(published)]:.2f}" if relative in published else "-",
@@ -157,13 +158,19 @@ def peak_table(kinds):
 
 def critical_table(kinds):
     return [[closures.get(kind.closure, "dry"), f"{kind.relative_rate:g}" if kind.closure else "-", len(rows), shown(rows, "friction_late", 3),
-             shown(rows, "grain_friction_late", 3), shown(rows, "pressure_late_kPa"), shown(rows, "lowest_pressure_kPa", 1),
-             shown(rows, "dilation_d"), shown(rows, "strain_at_peak", 3)] for kind, rows in kinds.items()]
+             shown(rows, "effective_friction_late", 3), shown(rows, "pressure_late_kPa"), shown(rows, "lowest_pressure_kPa", 1),
+             shown(rows, "dilation_d"), shown(rows, "strain_at_peak", 3)] for kind, rows in kinds.items() if to_the_end(rows)]
+
+
+def to_the_end(rows):
+    """Whether they have been sheared beyond the peak: without drag they are not."""
+    return min(r["strain"] for r in rows) > peak_strain
 
 
 def critical_state(kinds):
-    """In words, whether the friction of the grains at the end depends on the rate: dry and with drag, packing by packing."""
-    chosen = {k: {r["seed"]: r["grain_friction_late"] for r in rows} for k, rows in kinds.items() if k.closure in ("", "full")}
+    """In words, whether friction over the stress that the grains of the shear zone bear depends on the rate at the end: dry and with drag,
+    packing by packing."""
+    chosen = {k: {r["seed"]: r["effective_friction_late"] for r in rows} for k, rows in kinds.items() if k.closure in ("", "full") and to_the_end(rows)}
     common = set.intersection(*(set(v) for v in chosen.values())) if chosen else set()
     if len(chosen) < 2 or len(common) < 2:
         return "Whether the critical state depends on the rate cannot be told from so few runs."
@@ -171,8 +178,8 @@ def critical_state(kinds):
     difference = np.array([ordered[-1][s] - ordered[0][s] for s in sorted(common)])
     mean, half = mean_interval(difference)
     equal = abs(mean) <= half
-    return (f"Friction of the grains, shear stress over what they bear, over the last {100 * (1 - late):.0f} % of the strain: at the highest rate it is {mean:+.3f} ± {half:.3f} "
-            f"from that of the dry bed of the same packing, so {'no dependence on the rate is seen' if equal else 'it still depends on the rate'}.")
+    return (f"Shear stress over what the grains of the shear zone bear, σ_0 less the pressure there, over the last {100 * (1 - late):.0f} % of the strain: at the highest rate it is "
+            f"{mean:+.3f} ± {half:.3f} from that of the dry bed of the same packing, so {'no dependence on the rate is seen' if equal else 'it still depends on the rate'}.")
 
 
 def average(runs, pick):
@@ -300,12 +307,12 @@ def build(study, output, notes=None, say=print):
     page = Page()
     page.heading("Damsgaard et al. (2015), reproduced: dilatant hardening", 1)
     page.paragraph(f"{len(runs)} runs of {settings['grains']['count']} grains, seeds {', '.join(map(str, sorted({r.seed for r in runs})))}, preset {settings['model'].get('preset')}, "
-                   f"normal stress {first.sigma_0 / 1e3:g} kPa, sheared to a strain of {min(r['strain'] for r in rows):.2f}. "
+                   f"normal stress {first.sigma_0 / 1e3:g} kPa, sheared to a strain of {max(r['strain'] for r in rows):.2f}, without drag of {min(r['strain'] for r in rows):.2f}. "
                    f"{np.nansum(values(rows, 'hours')):.1f} hours of runs, settling apart, several at once. This report: version {made_by}, on {machine()}, {date.today()}.")
     page.paragraph(f"± is half of a 95 % interval over the packings. Peaks are the original's: the largest value of τ/σ_0, smoothed by a Hann window over {peak_rows} of its records of "
                    f"{peak_record:g} s (a strain of {peak_rows * peak_record * rate:g}), up to a strain of {peak_strain:g}. A relative rate of 1 is μ_f = {viscosity:g} Pa s, {rate:g} 1/s and "
                    f"k_c = {k_c:g} m²; lower ones have a higher k_c. The published values are of one packing: ours agree where one more run here would come out like "
-                   "theirs with a probability of 95 %.")
+                   "theirs with a probability of 95 %; peaks are compared by their logarithms, for the scatter goes with the level.")
     page.heading("Peak friction beside the published one")
     page.table(["relative rate", "published (20 kPa)", *(f"here, {text}" for text in closures.values()), "published, over the slowest", "here, with drag, over the dry bed"],
                peak_table(kinds))
@@ -316,8 +323,9 @@ def build(study, output, notes=None, say=print):
         page.paragraph(f"The dry bed's peak is {shown(dry, 'peak', 3)} here.")
     page.heading("Critical state")
     page.paragraph(critical_state(kinds))
-    page.table(["water", "relative rate", "runs", "τ/σ_0, end", "τ over what the grains bear, end", "pressure, end (kPa)", "lowest pressure (kPa)", "dilation, end (d)",
-                "strain at peak"], critical_table(kinds))
+    if table := critical_table(kinds):
+        page.table(["water", "relative rate", "runs", "τ/σ_0, end", "τ/(σ_0 - p), end", "pressure, end (kPa)", "lowest pressure (kPa)", "dilation, end (d)",
+                    "strain at peak"], table)
     variants = variants_of(study, runs, note)
     if variants:
         page.heading("Tests of causes")
