@@ -12,7 +12,7 @@ import numpy as np
 
 from . import measure, style
 from .case import Case, MissingData
-from .page import Page, machine, version
+from .page import LeftOut, Page, beside, machine, version
 from .progress import duration
 from .style import panel, plt
 
@@ -215,7 +215,7 @@ captions = {
 def variants_of(study, run):
     """{name: runs} of the studies beside this one with as many grains."""
     found = {}
-    for other in sorted(p for p in Path(study).resolve().parent.iterdir() if p.is_dir() and p.name != Path(study).resolve().name):
+    for other in beside(study):
         runs = [r for r in load(other, lambda _: None) if r.case.settings["grains"]["count"] == run.case.settings["grains"]["count"]]
         if runs:
             found[other.name] = runs
@@ -224,16 +224,11 @@ def variants_of(study, run):
 
 def build(study, output, notes=None, say=print):
     """study: directory of runs (runs/NAME). Writes levels.csv, figures/, report.html, report.md to `output`."""
-    output, left_out = Path(output), []
-
-    def note(why):
-        left_out.append(why)
-        say(why)
-
+    output, note = Path(output), LeftOut(say)
     made_by = version()
     runs = load(study, note)
     if not runs:
-        raise MissingData(f"{study}: there is no run to report" + "".join(f"; {w}" for w in left_out))
+        raise MissingData(f"{study}: there is no run to report" + "".join(f"; {w}" for w in note))
     output.mkdir(parents=True, exist_ok=True)
     run, settings = runs[0], runs[0].case.settings
     theirs = original(run.period)
@@ -265,7 +260,7 @@ def build(study, output, notes=None, say=print):
         page.table(["settings", "periods", *(f"contacts at {p:g} s" for p in (1.0, 3.0, 4.0, 4.5)), "periods with a burst", "fastest (m/s)"],
                    [[name, own[0].record.periods, *(number(own[0].record.level(p * own[0].period / 5)) for p in (1.0, 3.0, 4.0, 4.5)),
                      sum(np.isfinite(b[1]) for b in own[0].record.bursts()), f"{max(x[2] for x in own[0].by_period()):.3g}"] for name, own in variants.items()])
-    for why in left_out:
+    for why in note:
         page.paragraph(why.replace(f"{root}/", ""))
     if notes:
         page.notes(Path(notes).read_text())

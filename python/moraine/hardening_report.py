@@ -13,7 +13,7 @@ import numpy as np
 from . import measure, shearing, style, water_figures
 from .case import Case, MissingData
 from .intervals import compare, further_run, mean_interval, show
-from .page import Page, machine, version
+from .page import LeftOut, Page, beside, machine, version
 from .progress import duration
 from .style import lines, panel, plt
 
@@ -279,7 +279,7 @@ captions = {
 def variants_of(study, own, note):
     """{name: measured rows} of the studies beside this one that share its number of grains and its stress."""
     found = {}
-    for other in sorted(p for p in Path(study).resolve().parent.iterdir() if p.is_dir() and p.name != Path(study).resolve().name):
+    for other in beside(study):
         runs = [r for r in load(other, lambda _: None) if r.case.settings["grains"]["count"] == own[0].case.settings["grains"]["count"]
                 and r.sigma_0 == own[0].sigma_0]
         if runs:
@@ -289,16 +289,11 @@ def variants_of(study, own, note):
 
 def build(study, output, notes=None, say=print):
     """study: directory of runs (runs/NAME). Writes measurements.csv, figures/, report.html, report.md to `output`."""
-    output, left_out = Path(output), []
-
-    def note(why):
-        left_out.append(why)
-        say(why)
-
+    output, note = Path(output), LeftOut(say)
     made_by = version()  # before this report changes a file that the repository keeps
     runs = load(study, note)
     if not runs:
-        raise MissingData(f"{study}: no run has come to its end" + "".join(f"; {w}" for w in left_out))
+        raise MissingData(f"{study}: no run has come to its end" + "".join(f"; {w}" for w in note))
     output.mkdir(parents=True, exist_ok=True)
     rows = [r.measured() for r in runs]
     measure.table(rows, output / "measurements.csv")
@@ -336,7 +331,7 @@ def build(study, output, notes=None, say=print):
                        [[closures.get(k.closure, "dry"), f"{k.relative_rate:g}", len(own), shown(own, "peak"),
                          shown([r for r in kinds.get(k, []) if r["seed"] in {o["seed"] for o in own}], "peak"), shown(own, "lowest_pressure_kPa", 1)]
                         for k, own in by_kind(other).items()])
-    for why in left_out:
+    for why in note:
         page.paragraph(why)
     if notes:
         page.notes(Path(notes).read_text())

@@ -81,3 +81,20 @@ def version():
     root = Path(__file__).resolve().parents[2]
     git = subprocess.run(["git", "-C", str(root), "describe", "--always", "--dirty"], capture_output=True, text=True)
     return git.stdout.strip() if git.returncode == 0 else "unknown"
+
+
+class LeftOut(list):
+    """What a report leaves out, in words; called with them it says them, too."""
+
+    def __init__(self, say):
+        self.say = say
+
+    def __call__(self, why):
+        self.append(why)
+        self.say(why)
+
+
+def beside(study):
+    """The other directories of runs beside this one, in order."""
+    study = Path(study).resolve()
+    return sorted(p for p in study.parent.iterdir() if p.is_dir() and p != study)
