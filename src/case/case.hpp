@@ -124,6 +124,7 @@ struct Case {
   dem::ContactParameters contact, wall;
   double wall_mass;         // kg; 0: 0.001 of the mass of N spheres as wide as a lattice cell
   double gravity;           // m/s2
+  double density_scaling;   // m, smaller radii have the inertia of this one; 0: none
   double dt;                // s; 0: by eq. 9
   bool automatic_dt;        // dt follows the contact network instead
   double safety;            // of the critical step, with automatic_dt

@@ -159,6 +159,7 @@ std::vector<Key> make_keys() {
       row<wall, &P::gamma_t>("wall.gamma_t", "N s/m", "1e4", ">= 0", "tangential viscosity against walls, likewise"),
 
       row<&C::gravity>("model.gravity", "m/s2", "9.80665", ">= 0", "along -z"),
+      row<&C::density_scaling>("model.density_scaling", "m", "0", ">= 0", "density scaling by size, for a longer step: radii below this have the inertia of this one, and their own weight; 0: none"),
       row<&C::preset>("model.preset", "", "\"none\"", "none | paper | standard | fast", "accuracy against time: sets f, softening and the walls' viscosity where the case does not; see below"),
       row<&C::softening>("model.softening", "1", "1", ">= 1", "k_n and k_t of grains and walls are divided by it; viscosities are not"),
       {"model.f", Type::number, "1", "0.075", "> 0", "time step in units of sqrt(min m / max(k_n, k_t)), eq. 9; a stage may have its own", "", set_nothing},

@@ -228,7 +228,7 @@ Observation observe(const Scene& scene, const State& s, const Loads& loads) {
   Index free = 0;
   for (Index i = 0; i < s.size(); ++i) {
     const Mobility mob = mobility(scene, s.r[i], s.part_of[i]);
-    const double m = sphere_mass(scene.density, s.r[i]), inertia = 0.4 * m * s.r[i] * s.r[i];
+    const double m = scene.inertial_mass(s.r[i]), inertia = 0.4 * m * s.r[i] * s.r[i];
     // 1/2 m v(n-1/2).v(n+1/2)
     const auto before_times_after = [](const Vec3d& before, const Vec3d& at) {
       return dot(before, at + (at - before));
@@ -236,7 +236,7 @@ Observation observe(const Scene& scene, const State& s, const Loads& loads) {
     e.kinetic += 0.5 * m * before_times_after(s.v[i], at.v[i]);
     e.rotational += 0.5 * inertia * before_times_after(s.omega[i], at.omega[i]);
     if (s.part_of[i] != BodyId::none) continue;
-    e.potential += m * scene.submerged_gravity() * s.x[i].z;
+    e.potential += sphere_mass(scene.density, s.r[i]) * scene.submerged_gravity() * s.x[i].z;
     const Vec3d a =
         mob.acceleration(s.water_force.empty() ? loads.force[i] : loads.force[i] + s.water_force[i]);
     net += m * std::sqrt(dot(a, a));

@@ -21,6 +21,7 @@ struct Scene {
   bool periodic_x = true, periodic_y = true, periodic_z = false;
   double gravity = 9.80665;  // m/s2
   double density = 2600;     // kg/m3, of the grains
+  double least_inertia = 0;  // m; density scaling: smaller grains have the inertia of this radius; 0: none
   double fluid_density = 0;  // kg/m3, of water that fills the pores; 0: dry
   std::int64_t exchange_interval =
       0;              // steps between exchanges with pore water (fluid_coupling.hpp); 0: none
@@ -49,10 +50,18 @@ struct Scene {
     return part_of != BodyId::none && body(part_of).is_held(2);
   }
 
+  MORAINE_HD double inertial_mass(double r) const;  // kg; more than the weight tells, by density scaling
+
   MORAINE_HD double area() const { return box.x * box.y; }  // m2
   MORAINE_HD double submerged_gravity() const {
     return gravity * (1 - fluid_density / density);
   }  // m/s2, less buoyancy
+
+  // m/s2, of a grain of this radius, whose weight density scaling leaves as it is.
+  MORAINE_HD double fall(double r) const {
+    const double part = r < least_inertia ? r / least_inertia : 1;
+    return submerged_gravity() * (part * part * part);
+  }
 
   // s, since the stage began.
   MORAINE_HD double time(std::int64_t step) const { return time_0 + static_cast<double>(step - step_0) * dt; }
@@ -70,5 +79,9 @@ struct Scene {
 
 MORAINE_HD double sphere_volume(double r) { return 4.0 / 3.0 * std::numbers::pi * r * r * r; }
 MORAINE_HD double sphere_mass(double density, double r) { return density * sphere_volume(r); }
+
+MORAINE_HD double Scene::inertial_mass(double r) const {
+  return sphere_mass(density, r < least_inertia ? least_inertia : r);
+}
 
 }  // namespace moraine::dem

@@ -48,7 +48,7 @@ class Network {
       const double xy = root(m.inverse_mass_xy), spin = root(m.inverse_inertia);
       root_.push_back({xy, xy, root(m.inverse_mass_z)});
       root_.push_back({spin, spin, spin});
-      if (s.part_of[i] == BodyId::top_layer) layer_mass += sphere_mass(scene.density, s.r[i]);
+      if (s.part_of[i] == BodyId::top_layer) layer_mass += scene.inertial_mass(s.r[i]);
     }
     const Body &wall = scene.body(BodyId::top_wall), &layer = scene.body(BodyId::top_layer);
     if (wall.z.kind == Drive::Kind::stress) wall_root_ = root(1 / wall.mass);
@@ -228,7 +228,7 @@ double critical_step(const Spectrum& s) {
 }
 
 double one_contact_step(const Scene& scene, const State& s) {
-  const double m = sphere_mass(scene.density, *std::min_element(s.r.begin(), s.r.end()));
+  const double m = scene.inertial_mass(*std::min_element(s.r.begin(), s.r.end()));
   const double turning = 2.5;  // m r^2/I of a sphere
   double step = critical_step(scene.with(Material::grain), 2 / m, 2 * turning / m);
   for (const BodyId id : planes) {

@@ -18,7 +18,7 @@ inline constexpr bool hdf5::all_doubles<Row> = true;
 namespace {
 
 constexpr const char* kind = "checkpoint";
-constexpr std::int64_t format = 7;  // raise it with every change to a struct below
+constexpr std::int64_t format = 8;  // raise it with every change to a struct below
 
 // Every member of every stored struct, once, for writing and for reading. A new member is one more line; one
 // that is forgotten does not compile.
@@ -57,6 +57,7 @@ constexpr std::tuple members<dem::Scene>{
     Member{"periodic_z", &dem::Scene::periodic_z},
     Member{"gravity", &dem::Scene::gravity},
     Member{"density", &dem::Scene::density},
+    Member{"least_inertia", &dem::Scene::least_inertia},
     Member{"fluid_density", &dem::Scene::fluid_density},
     Member{"exchange_interval", &dem::Scene::exchange_interval},
     Member{"dt", &dem::Scene::dt},

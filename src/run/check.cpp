@@ -95,6 +95,20 @@ void check_case(const Options& options) {
         "%.4g m\n",
         sizes.smallest, sizes.largest, sizes.largest / sizes.smallest, sizes.d10, sizes.d50, sizes.d60,
         sizes.d90, sizes.sauter);
+  // What density scaling makes of the density that answers to forces.
+  double inertial_density = c.grains.density;
+  if (c.density_scaling > 0.5 * sizes.smallest) {
+    dem::Scene scaled;
+    scaled.density = c.grains.density, scaled.least_inertia = c.density_scaling;
+    double mass = 0;
+    for (const double r : state.r) mass += scaled.inertial_mass(r);
+    inertial_density = mass / volume;
+    std::printf(
+        "  scaling       radii below %.4g m have its inertia: the bed's is %.3g times its own, and the step "
+        "%.3g times as long\n",
+        c.density_scaling, inertial_density / c.grains.density,
+        std::pow(2 * c.density_scaling / sizes.smallest, 1.5));
+  }
   std::printf("  memory        about %.0f MB\n", bytes_needed(n, c.has_water()) / 1e6);
 
   if (c.preset != "none" || c.softening != 1) {
@@ -148,7 +162,7 @@ void check_case(const Options& options) {
           c.contact.k_n / (wanted.normal_stress * diameter) < 1e4 ? "  (below 1e4: softer than rigid grains)"
                                                                   : "");
       if (strain_rate != 0) {
-        const double inertia = std::abs(strain_rate) * r * std::sqrt(c.grains.density / wanted.normal_stress);
+        const double inertia = std::abs(strain_rate) * r * std::sqrt(inertial_density / wanted.normal_stress);
         std::printf("    inertia     I = %.3g (eq. 1)%s\n", inertia,
                     inertia > 1e-3 ? "  (above 1e-3: not pseudo-static)" : "");
       }

@@ -51,6 +51,7 @@ dem::Scene scene_of(const cases::Case& c, const cases::Stage& stage, const Start
   scene.box = {start.box_x, start.box_y, start.box_z};
   scene.periodic_x = c.periodic_x, scene.periodic_y = c.periodic_y, scene.periodic_z = c.periodic_z;
   scene.gravity = c.gravity, scene.density = c.grains.density;
+  scene.least_inertia = c.density_scaling;
   dem::ContactParameters &grain = scene.with(dem::Material::grain), &wall = scene.with(dem::Material::wall);
   grain = c.contact, wall = c.wall;
   grain.gamma_n = stage.gamma_n, grain.gamma_t = stage.gamma_t;
@@ -107,7 +108,7 @@ double sauter_diameter(const dem::State& s) {
 
 // dt = f sqrt(min m / max k), eq. 9; the walls count among the k.
 double step_by_eq_9(const dem::Scene& scene, const dem::State& s, double f) {
-  const double m = dem::sphere_mass(scene.density, *std::min_element(s.r.begin(), s.r.end()));
+  const double m = scene.inertial_mass(*std::min_element(s.r.begin(), s.r.end()));
   double k = 0;
   for (const dem::ContactParameters& p : scene.contact) k = std::max({k, p.k_n, p.k_t});
   return f * std::sqrt(m / k);

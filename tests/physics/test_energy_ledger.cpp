@@ -30,6 +30,11 @@ std::vector<Variant> variants() {
   drive_top_layer(all.back().bed.scene, Drive::by(200));
   all.back().bed.scene.body(BodyId::top_layer).mass = 10;  // kg, tens of times the layer's grains
   all.push_back({"sheared along side walls", sheared_between_walls()});
+  all.push_back({"density scaling", sheared_bed()});
+  Bed& scaled = all.back().bed;  // half the grains
+  std::vector<double> r = scaled.state.r;
+  std::nth_element(r.begin(), r.begin() + r.size() / 2, r.end());
+  scaled.scene.least_inertia = 1.2 * r[r.size() / 2];
   return all;
 }
 
