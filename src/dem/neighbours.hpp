@@ -65,8 +65,9 @@ struct CellGrid {
   }
 };
 
-// Level l has the radii from `largest` of the next, or all that are left, to its own; each is half of the one
-// before.
+// Level l has the radii from `largest` of the next, or all that are left, to its own. Fewer levels are fewer
+// cells to look into, more have fewer grains in them.
+constexpr double level_ratio = 2.8;
 constexpr int most_levels = 10;
 struct Levels {
   CellGrid grid[most_levels];
@@ -253,9 +254,9 @@ struct Neighbours {
     }
     Levels levels;
     levels.count = 1;
-    for (double r = largest / 2; levels.count < most_levels && smallest <= r; r /= 2) ++levels.count;
+    for (double r = largest / level_ratio; levels.count < most_levels && smallest <= r; r /= level_ratio) ++levels.count;
     std::int32_t before = 0;
-    for (int l = 0; l < levels.count; ++l, largest /= 2) {
+    for (int l = 0; l < levels.count; ++l, largest /= level_ratio) {
       CellGrid& grid = levels.grid[l];
       grid = {origin, {0, 0, 0}, {1, 1, 1}, sides, before, largest};
       double width = 2 * largest + margin;

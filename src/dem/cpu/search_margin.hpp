@@ -22,7 +22,7 @@ class SearchMargin {
     // The number of pairs beyond those that nearly touch grows with the margin, that of searches falls with
     // it, so the sum is least where both cost the same.
     const double wasted = share_wasted * drawing * times_drawn, searching = seconds - drawing;
-    margin_ *= wasted > 0 ? std::clamp(std::sqrt(searching / wasted), 0.7, 1.4) : 1.4;
+    margin_ *= wasted > 0 ? std::clamp(std::sqrt(searching / wasted), 0.7, 2.0) : 2.0;
     margin_ = std::clamp(margin_, least_, most_);
   }
 
