@@ -31,19 +31,19 @@ def layer_displacement(snapshot):
     return snapshot.grains["displacement"][driven, 0].mean()
 
 
-def shear_zone(snapshot, share=0.05):
-    """Thickness of the shear zone in mean grain diameters, two ways:
+def shear_zone(snapshot, share=0.05, diameter=None):
+    """Thickness of the shear zone in diameters (m; the mean of the grains by default), and read off slabs as thick, two ways:
 
     depth     from the middle of the driven layer down to where the slab mean of the displacement along x has fallen to `share`
               of the layer's, whichever way that went (linear between slab middles)
     integral  the integral over z of u(z)/u_layer: the thickness of a block that moves with the layer and carries as much
     """
-    d, u_layer = 2 * snapshot.grains["radius"].mean(), layer_displacement(snapshot)
+    d, u_layer = diameter or 2 * snapshot.grains["radius"].mean(), layer_displacement(snapshot)
     if u_layer == 0:
         raise MissingData(f"{snapshot.file}: the driven layer has not moved since shear began: there is no shear zone")
     driven = snapshot.grains["role"] == 2
     top = snapshot.grains["position"][driven, 2].mean()
-    z, u = displacement(snapshot)
+    z, u = displacement(snapshot, d)
     if u_layer < 0:
         u, u_layer = -u, -u_layer
     edges = slabs(snapshot.top_wall, d)

@@ -3,7 +3,7 @@
 study.toml names the cases of the study, directories beside it, each once for each seed:
 
     title = "..."                 of its report
-    report = "paper"              which report: paper, hardening or creep (moraine.report)
+    report = "paper"              which report: paper, hardening, creep or grading (moraine.report)
     seeds = 3                     how many packings, where --seeds does not say
 
     [[case]]
@@ -13,6 +13,7 @@ study.toml names the cases of the study, directories beside it, each once for ea
     name = "shear"
     start = "settle"              the case it starts from; what another case starts from is called a bed
     lists = { normal_stress = "10,20 kPa" }   one run for each value, or combination, by `moraine sweep`
+    quick = { "grains.count" = "500" }        what --quick changes in this case; or false, which leaves it out
 
     [quick]                       what --quick changes
     seeds = 2
@@ -48,6 +49,7 @@ class Part:
     start: str = ""                             # name of another one
     lists: dict = field(default_factory=dict)   # KEY: "VALUE,VALUE unit"
     stages: tuple = ()                          # names of the stages it runs
+    quick: dict = field(default_factory=dict)   # KEY: VALUE with --quick
 
     @property
     def count(self):
@@ -93,16 +95,21 @@ def read(home):
         expect(isinstance(value, known[key][0]), key, known[key][1])
     expect(what.get("title"), "title", "a text")
     expect(what.get("case"), "case", "at least one [[case]]")
+    for case in what["case"]:
+        expect(isinstance(case.get("quick", {}), dict) or case["quick"] is False, "case.quick", "a table of keys and values, or false")
     for table in (what.get("quick", {}), *what["case"]):
-        for key, value in {**table.get("lists", {}), **table.get("set", {})}.items():
+        for key, value in {**table.get("lists", {}), **table.get("set", {}), **(table.get("quick") or {})}.items():
             expect(isinstance(value, str), key, "a text, as --set takes it")
     names = []
     for case in what["case"]:
-        expect(not case.keys() - {"name", "start", "lists"}, "case", "name, start and lists")
+        expect(not case.keys() - {"name", "start", "lists", "quick"}, "case", "name, start, lists and quick")
         expect(case.get("name") and (Path(home) / case["name"] / "case.toml").exists(), f"case.name = {case.get('name')}",
                "a directory beside it, with a case.toml")
         expect(case["name"] not in names, f"case.name = {case['name']}", "each case once")
         expect(case.get("start", "") in ("", *names), f"case.start = {case.get('start')}", "a case above it")
+        if case.get("start"):
+            left_out = next(c for c in what["case"] if c.get("name") == case["start"]).get("quick") is False
+            expect(not left_out or case.get("quick") is False, f"case.quick = false: {case['start']}", f"false in {case['name']}, which starts from it, too")
         names.append(case["name"])
     return what
 
@@ -128,9 +135,11 @@ class Study:
         self.quick_settings = quick.get("set", {})
         if not self.seeds:
             self.seeds = list(range(1, quick.get("seeds", what.get("seeds", 1)) + 1))
+        what["case"] = [case for case in what["case"] if not (self.quick and case.get("quick") is False)]
         lists = {k: v for case in what["case"] for k, v in case.get("lists", {}).items()} | quick.get("lists", {}) | self.lists
         self.parts = {case["name"]: Part(case["name"], case.get("start", ""), {k: lists[k] for k in case.get("lists", {})},
-                                         stages_of((Path(self.home) / case["name"]).resolve())) for case in what["case"]}
+                                         stages_of((Path(self.home) / case["name"]).resolve()),
+                                         (case.get("quick") or {}) if self.quick else {}) for case in what["case"]}
         for key in self.lists:
             if not any(key in part.lists for part in self.parts.values()):
                 raise MissingData(f"{key} is not a list of {Path(self.home) / 'study.toml'}")
@@ -239,7 +248,7 @@ class Study:
         elif part.name in self.beds:
             own = [(k, v) for k, v in own if self.concerns_bed(k)]
         tables = {"model.preset": json.dumps(self.preset), "grains.seed": str(seed)}
-        tables |= {k: toml(v) for k, v in (*self.quick_settings.items(), *own) if self.concerns(k, part)}
+        tables |= {k: toml(v) for k, v in (*self.quick_settings.items(), *part.quick.items(), *own) if self.concerns(k, part)}
         text = f'extends = "../../../../{part.name}"\n'
         if part.start:
             start = os.path.relpath(self.directory(part.start, seed), self.directory(part.name, seed))

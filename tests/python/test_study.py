@@ -26,7 +26,7 @@ def cases_of(study):
 
 
 def test_every_study_can_be_read():
-    assert reproduce.studies() == ["creep-2016", "hardening-2015", "paper-2013"]
+    assert reproduce.studies() == ["creep-2016", "grading", "hardening-2015", "paper-2013"]
     for name in reproduce.studies():
         for quick in False, True:
             assert cases_of(AnyStudy(root / "cases" / name, quick=quick))
@@ -131,6 +131,20 @@ def test_a_quick_study_sets_what_concerns_each_case(home):
     assert cases["runs/quick/seed-1/bed"]["stage"] == [{"name": "press", "duration": "0.1 s"}]
     assert cases["runs/quick/seed-1/wet"]["stage"] == [{"name": "shear", "strain": 0.1}]
     assert study.parts["wet"].lists["fluid.closure"] == "full,"
+
+
+def test_a_case_says_what_a_quick_study_makes_of_it(home):
+    file = home / "study.toml"
+    text = file.read_text().replace('name = "dry"\n', 'name = "dry"\nquick = { "stage.shear.strain" = "0.2" }\n').replace(
+        'name = "wet"\n', 'name = "wet"\nquick = false\n')
+    file.write_text(text)
+    cases = cases_of(Study(home, quick=True))
+    assert set(cases) == {f"runs/quick/seed-1/{name}" for name in ("bed", "dry")}
+    assert cases["runs/quick/seed-1/dry"]["stage"] == [{"name": "shear", "strain": 0.2}]  # before what [quick] says for all
+    assert "wet" in Study(home).parts and "stage" not in cases_of(Study(home))["runs/fast/seed-1/dry"]
+    file.write_text(text.replace('name = "bed"\n', 'name = "bed"\nquick = false\n'))
+    with pytest.raises(MissingData, match="case.quick = false: bed: expected false in dry, which starts from it, too"):
+        Study(home, quick=True)
 
 
 def test_a_setting_of_a_bed_s_stage_makes_a_bed(home):
