@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.collections import LineCollection
+from scipy import stats
 
 from . import compaction, forces, measure, profile, shearing, strength, style
 from .case import Case, MissingData
@@ -208,8 +209,7 @@ def tables(rows):
 
 
 def difference(rows, key, grading, reference="1"):
-    """Of the means of two gradings, with the half width of its 95 % interval: packings paired by nothing, so by Welch's t, averaged over
-    the normal stresses; nan for less than two runs of either."""
+    """Of the means of two gradings, with the half width of its 95 % interval, by Welch's t, averaged over the normal stresses; nan for less than two runs of either."""
     means, variances, freedoms = [], [], []
     for sigma in stresses(rows):
         a, b = values(select(rows, grading, sigma), key), values(select(rows, reference, sigma), key)
@@ -218,14 +218,13 @@ def difference(rows, key, grading, reference="1"):
         va, vb = a.var(ddof=1) / len(a), b.var(ddof=1) / len(b)
         means.append(a.mean() - b.mean()), variances.append(va + vb)
         freedoms.append(len(a) + len(b) - 2 if va + vb == 0 else (va + vb) ** 2 / (va**2 / (len(a) - 1) + vb**2 / (len(b) - 1)))
-    from scipy import stats
     return float(np.mean(means)), float(stats.t.ppf(0.975, sum(freedoms)) * np.sqrt(sum(variances)) / len(means))
 
 
-def verdict(mean, half, less, more, same):
+def verdict(mean, half, digits, less, more):
     if not np.isfinite(half):
         return "too few runs to tell"
-    return same if abs(mean) <= half else less if mean < 0 else more
+    return show(mean, half, digits) + ": " + ("no difference seen" if abs(mean) <= half else less if mean < 0 else more)
 
 
 def findings(rows):
@@ -237,11 +236,11 @@ def findings(rows):
         zone, friction = difference(rows, "shear_zone_d50", g), difference(rows, "friction_ultimate", g)
         peak = difference(rows, "friction_peak", g)
         found.append([f"shear zone of {gradings[g]} over that of 1:1, D50", "fines localise strain (Morgan & Boettcher 1999, two dimensions)",
-                      f"{show(*zone, 1)}: {verdict(*zone, 'thinner', 'thicker', 'no difference seen')}"])
+                      verdict(*zone, 1, "thinner", "thicker")])
         found.append([f"ultimate friction of {gradings[g]} less that of 1:1",
                       "no difference (Mair et al. 2002, glass beads); slightly lower with more fines (Morgan 1999, two dimensions)",
-                      f"{show(*friction, 3)}: {verdict(*friction, 'lower', 'higher', 'no difference seen')}"])
-        found.append([f"peak friction of {gradings[g]} less that of 1:1", "not told there", f"{show(*peak, 3)}: {verdict(*peak, 'lower', 'higher', 'no difference seen')}"])
+                      verdict(*friction, 3, "lower", "higher")])
+        found.append([f"peak friction of {gradings[g]} less that of 1:1", "not told there", verdict(*peak, 3, "lower", "higher")])
     return found
 
 
