@@ -36,8 +36,7 @@ MORAINE_HD Mobility mobility(const Scene& scene, double r, BodyId part_of) {
 // The same from a grain's row, which says by its inverse_inertia whether the grain is free.
 MORAINE_HD Mobility mobility(const Scene& scene, const GrainRow& g) {
   const bool free = g.inverse_inertia > 0;
-  return {free ? g.inverse_mass : 0, g.inverse_mass, free ? -scene.fall(g.r) : 0,
-          g.inverse_inertia};
+  return {free ? g.inverse_mass : 0, g.inverse_mass, free ? -scene.fall(g.r) : 0, g.inverse_inertia};
 }
 
 template <class Row>

@@ -73,16 +73,16 @@ struct Levels {
   CellGrid grid[most_levels];
   std::int32_t count = 0;
 
-  MORAINE_HD const CellGrid& of(double r) const {
+  MORAINE_HD int of(double r) const {
     int l = 0;
     while (l + 1 < count && r <= grid[l + 1].largest) ++l;
-    return grid[l];
+    return l;
   }
-  // Calls visit(first, last) for runs of cells in which a grain may be closer to x than radius and margin,
-  // its own radius not counted.
+  // Calls visit(first, last) for runs of cells, of this level and finer ones, in which a grain may be closer
+  // to x than radius and margin, its own radius not counted.
   template <class Visit>
-  MORAINE_HD void runs_around(const Vec3d& x, double r_and_margin, Visit&& visit) const {
-    for (int l = 0; l < count; ++l) grid[l].runs_within(x, r_and_margin + grid[l].largest, visit);
+  MORAINE_HD void runs_around(const Vec3d& x, double r_and_margin, int level, Visit&& visit) const {
+    for (int l = level; l < count; ++l) grid[l].runs_within(x, r_and_margin + grid[l].largest, visit);
   }
 };
 
@@ -116,7 +116,7 @@ struct Key {
   const GrainRow* grains;
   std::int32_t *key, *value;
   MORAINE_HD void operator()(std::int64_t i) const {
-    key[i] = levels.of(grains[i].r).index(grains[i].x);
+    key[i] = levels.grid[levels.of(grains[i].r)].index(grains[i].x);
     value[i] = static_cast<std::int32_t>(i);
   }
 };
@@ -154,7 +154,7 @@ struct Rows {
     std::int64_t found = 0;
     Index* const out = neighbour ? neighbour + row[i] : nullptr;
     const Sides& sides = levels.grid[0].sides;
-    levels.runs_around(a.x, a.r + margin, [&](std::int32_t first_cell, std::int32_t last_cell) {
+    levels.runs_around(a.x, a.r + margin, 0, [&](std::int32_t first_cell, std::int32_t last_cell) {
       for (std::int32_t cell = first_cell; cell <= last_cell; ++cell)
         for (std::int32_t k = first[cell]; k < end[cell]; ++k) {
           const Index j = order[k];
@@ -254,7 +254,8 @@ struct Neighbours {
     }
     Levels levels;
     levels.count = 1;
-    for (double r = largest / level_ratio; levels.count < most_levels && smallest <= r; r /= level_ratio) ++levels.count;
+    for (double r = largest / level_ratio; levels.count < most_levels && smallest <= r; r /= level_ratio)
+      ++levels.count;
     std::int32_t before = 0;
     for (int l = 0; l < levels.count; ++l, largest /= level_ratio) {
       CellGrid& grid = levels.grid[l];

@@ -14,7 +14,7 @@ class TouchingPairs {
   void each(const Scene& scene, const GrainRow* grains, Index n, Visit&& visit) {
     grains_.sort(Host{}, scene, grains, n, 0);
     for (Index k = 0; k < n; ++k)
-      grains_.around(grains_.x(k), grains_.r(k), 0, k + 1, [&](Index l, double reach, double distance2) {
+      grains_.after(k, 0, [&](Index l, double reach, double distance2) {
         visit(grains_.grain(k), grains_.grain(l), reach - std::sqrt(distance2));
       });
   }

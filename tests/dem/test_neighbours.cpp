@@ -5,6 +5,7 @@
 
 #include <map>
 #include <random>
+#include <set>
 
 #include "dem/touching.hpp"
 
@@ -74,16 +75,19 @@ void expect_all_pairs(const Case& c, std::uint64_t seed) {
 
   CloseGrains close;
   close.sort(Host{}, s, grains.data(), c.n, margin);
-  for (Index i = 0; i < c.n; ++i) {
-    std::vector<Index> expected, around;
-    for (Index j = 0; j < c.n; ++j)
+  std::set<std::array<Index, 2>> expected, near;
+  for (Index i = 0; i < c.n; ++i)
+    for (Index j = i + 1; j < c.n; ++j)
       if (length(nearest_image(sides, grains[i].x - grains[j].x)) < grains[i].r + grains[j].r + margin)
-        expected.push_back(j);
-    close.around(grains[i].x, grains[i].r, margin, 0,
-                 [&](Index k, double, double) { around.push_back(close.grain(k)); });
-    std::sort(around.begin(), around.end());
-    ASSERT_EQ(around, expected) << "grain " << i;
+        expected.insert({i, j});
+  for (Index i = 0; i < c.n; ++i) {
+    ASSERT_EQ(close.grain(close.place(i)), i);
+    close.after(close.place(i), margin, [&](Index k, double, double) {
+      const Index j = close.grain(k);
+      EXPECT_TRUE(near.insert({std::min(i, j), std::max(i, j)}).second) << i << ' ' << j << " twice";
+    });
   }
+  EXPECT_EQ(near, expected);
 }
 
 TEST(Neighbours, RefuseWhatIsNoPlace) {

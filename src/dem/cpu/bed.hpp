@@ -7,6 +7,7 @@
 // (sums.hpp).
 #pragma once
 #include <array>
+#include <map>
 #include <vector>
 
 #include "backend/host.hpp"
@@ -49,6 +50,10 @@ struct Outgoing {
   Index to, size;
 };
 
+struct GrainPair {
+  Index i, j;  // i < j
+};
+
 struct alignas(64) Chunk {
   Index number, begin, end;
   int owner = 0;
@@ -64,6 +69,7 @@ struct alignas(64) Chunk {
   std::vector<Index> incoming;    // links, by the chunk they come from
   Index first_link = 0;           // its own links are this one and the next ones,
   std::vector<Outgoing> outgoing;
+  std::map<Index, std::vector<GrainPair>> found;        // by its search, by the chunk of i
   std::array<std::vector<Index>, most_servos> members;  // its grains in each servo's layer
   Index lost = -1;                                      // a grain that went wrong
 

@@ -42,33 +42,56 @@ void for_each_chunk(const Host& space, Bed& bed, Work&& work) {
   });
 }
 
-// Candidates of one chunk, by (i, j), and how many go to each later chunk.
-void find_pairs(Bed& bed, Chunk& chunk, const CloseGrains& grains) {
-  OldPlaces inside(std::exchange(chunk.candidates[0], {})), across(std::exchange(chunk.candidates[1], {}));
+// Pairs that the grains of one chunk find, each pair once by one of its grains; the other may be of an
+// earlier chunk, whose pair it then is.
+void find_pairs(const Bed& bed, Chunk& chunk, const CloseGrains& grains) {
   const auto is_rigid = [&](Index i) { return bed.scene.is_rigid(bed.part_of.data()[i]); };
-  chunk.outgoing.clear();
-  std::vector<Index> found;
-  for (Index i = chunk.begin; i < chunk.end; ++i) {
-    const GrainRow& g = bed.grain.data()[i];
-    const bool rigid = is_rigid(i);
-    found.clear();
-    grains.around(g.x, g.r, bed.margin, 0, [&](Index k, double, double) {
-      const Index j = grains.grain(k);
-      if (j > i && !(rigid && is_rigid(j))) found.push_back(j);
+  for (auto& [of, pairs] : chunk.found) pairs.clear();
+  std::vector<GrainPair>& own = chunk.found[chunk.number];
+  for (Index a = chunk.begin; a < chunk.end; ++a) {
+    const bool rigid = is_rigid(a);
+    grains.after(grains.place(a), bed.margin, [&](Index k, double, double) {
+      const Index b = grains.grain(k);
+      if (rigid && is_rigid(b)) return;
+      const GrainPair pair{std::min(a, b), std::max(a, b)};
+      (pair.i >= chunk.begin ? own : chunk.found[bed.order.chunk_of(pair.i)]).push_back(pair);
     });
-    std::sort(found.begin(), found.end());
-    for (const Index j : found) {
-      if (j < chunk.end) {
-        chunk.candidates[0].push_back({i, j, no_link, inside.of(i, j)});
-        continue;
-      }
-      const Index to = bed.order.chunk_of(j);
-      auto link = std::ranges::find(chunk.outgoing, to, &Outgoing::to);
-      if (link == chunk.outgoing.end()) link = chunk.outgoing.insert(link, {to, 0});
-      ++link->size;
-      chunk.candidates[1].push_back(
-          {i, j, static_cast<Index>(link - chunk.outgoing.begin()), across.of(i, j)});
+  }
+}
+
+// Pairs of one chunk that all have found, by (i, j).
+std::vector<GrainPair> sorted_pairs(const Bed& bed, const Chunk& chunk) {
+  std::vector<std::size_t> row(chunk.end - chunk.begin + 2);  // where that of i ends, two places on
+  const auto each = [&](auto&& use) {
+    for (const Chunk& from : bed.chunks)
+      if (const auto found = from.found.find(chunk.number); found != from.found.end())
+        for (const GrainPair& pair : found->second) use(pair, pair.i - chunk.begin);
+  };
+  each([&](const GrainPair&, Index at) { ++row[at + 2]; });
+  for (std::size_t k = 2; k < row.size(); ++k) row[k] += row[k - 1];
+  std::vector<GrainPair> pairs(row.back());
+  each([&](const GrainPair& pair, Index at) { pairs[row[at + 1]++] = pair; });
+  for (std::size_t k = 0; k + 1 < row.size(); ++k)
+    std::sort(pairs.begin() + static_cast<std::ptrdiff_t>(row[k]),
+              pairs.begin() + static_cast<std::ptrdiff_t>(row[k + 1]),
+              [](const GrainPair& a, const GrainPair& b) { return a.j < b.j; });
+  return pairs;
+}
+
+// Candidates of one chunk, by (i, j), and how many go to each later chunk.
+void take_pairs(const Bed& bed, Chunk& chunk) {
+  OldPlaces inside(std::exchange(chunk.candidates[0], {})), across(std::exchange(chunk.candidates[1], {}));
+  chunk.outgoing.clear();
+  for (const auto& [i, j] : sorted_pairs(bed, chunk)) {
+    if (j < chunk.end) {
+      chunk.candidates[0].push_back({i, j, no_link, inside.of(i, j)});
+      continue;
     }
+    const Index to = bed.order.chunk_of(j);
+    auto link = std::ranges::find(chunk.outgoing, to, &Outgoing::to);
+    if (link == chunk.outgoing.end()) link = chunk.outgoing.insert(link, {to, 0});
+    ++link->size;
+    chunk.candidates[1].push_back({i, j, static_cast<Index>(link - chunk.outgoing.begin()), across.of(i, j)});
   }
 }
 
@@ -192,8 +215,9 @@ double least_gap(const Bed& bed, const WatchList& watched) {
 double find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const Control& control) {
   const BodyMotion& bodies = control.bodies;
   grains.sort(space, bed.scene, bed.grain.data(), bed.n, bed.margin);
+  for_each_chunk(space, bed, [&](Chunk& chunk) { find_pairs(bed, chunk, grains); });
   for_each_chunk(space, bed, [&](Chunk& chunk) {
-    find_pairs(bed, chunk, grains);
+    take_pairs(bed, chunk);
     find_plane_pairs(bed, chunk, bodies);
     for (Index i = chunk.begin; i < chunk.end; ++i) bed.searched.data()[i].x = bed.grain.data()[i].x;
   });
