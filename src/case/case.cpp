@@ -203,7 +203,7 @@ fs::path start_file(const fs::path& directory, const Entry& entry) {
   }
   if (!fs::is_regular_file(path))
     throw error(entry.stated, ": there is no ", path.string(),
-                "; expected a finished case, a checkpoint or a table of grains, relative to ",
+                "; expected a finished case, a checkpoint or a file of grains, relative to ",
                 directory.string());
   return path;
 }

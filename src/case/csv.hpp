@@ -19,6 +19,7 @@ class CsvTable {
   // Columns that none of these names asks for: most likely misspelled. Throws Error if there are any.
   void expect_only(const std::vector<std::string>& names) const;
   std::size_t rows() const { return lines_.size(); }
+  int line(std::size_t row) const { return lines_[row]; }
   // "FILE, line N", for messages.
   std::string at(std::size_t row) const;
   const std::filesystem::path& file() const { return file_; }

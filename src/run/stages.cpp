@@ -10,8 +10,8 @@
 #include "dem/packing.hpp"
 #include "error.hpp"
 #include "output/sealed.hpp"
-#include "run/grain_table.hpp"
 #include "run/needs.hpp"
+#include "run/own_grains.hpp"
 #include "run/schedule.hpp"
 
 namespace moraine::run {
@@ -134,9 +134,10 @@ static std::vector<dem::Sieve> sieves_in(const std::filesystem::path& file) {
 }
 
 Start start_of(const cases::Case& c) {
-  if (is_grain_table(c.start)) {
-    Start s{{}, c.box_x, c.box_y, c.box_z, 0};
-    s.before.state = read_grain_table(c);
+  if (has_own_grains(c.start)) {
+    OwnGrains own = read_own_grains(c);
+    Start s{{}, own.box_x, own.box_y, own.box_z, 0};
+    s.before.state = std::move(own.state);
     double volume = 0;
     for (const double r : s.before.state.r) volume += r * r * r;
     const double n = s.before.state.size();
