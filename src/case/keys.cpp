@@ -120,7 +120,7 @@ std::vector<Key> make_keys() {
       // clang-format off
       no_physics(row<&C::title>("title", "", "\"\"", "", "what the case is about")),
       {"extends", Type::text, "", "\"\"", "", "directory of a case whose keys and stages this one takes over", "", nullptr},
-      row<&C::start>("start", "", "\"\"", "", "where the grains come from: a finished case, a checkpoint file, a table of grains NAME.csv with the columns x, y, z, r, or a LAMMPS data file NAME.data; empty: drawn, see grains"),
+      row<&C::start>("start", "", "\"\"", "", "where the grains come from: a finished case, a checkpoint file, a table of grains NAME.csv with the columns x, y, z, r, a LAMMPS data file NAME.data, or a snapshot; empty: drawn, see grains"),
       {"stages", Type::list, "", "[]", "", "names of the stages to run, in order; empty: all", "", nullptr},
 
       row<&C::box_x>("box.x", "m", "0", ">= 0", "side along the shear direction; 0: from the lattice or `start`"),

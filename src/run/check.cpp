@@ -95,6 +95,11 @@ void check_case(const Options& options) {
         "%.4g m\n",
         sizes.smallest, sizes.largest, sizes.largest / sizes.smallest, sizes.d10, sizes.d50, sizes.d60,
         sizes.d90, sizes.sauter);
+  if (!start.roles.empty())
+    std::printf("  roles         %td grains of bottom_layer, %td of top_layer\n",
+                std::ranges::count(start.roles, dem::BodyId::bottom_layer),
+                std::ranges::count(start.roles, dem::BodyId::top_layer));
+  if (!start.note.empty()) std::printf("  start         %s\n", start.note.c_str());
   std::printf("  memory        about %.0f MB\n", bytes_needed(n, c.has_water()) / 1e6);
 
   if (c.preset != "none" || c.softening != 1) {

@@ -27,17 +27,39 @@ std::string digits(double x) {
 }
 
 using Line = std::initializer_list<double>;
-void add(std::ostream& out, const Line& numbers, const char* between) {
+void add(std::ostream& out, const Line& numbers, const char* between, const std::string& after = {}) {
   const char* before = "";
   for (const double x : numbers) out << before << digits(x), before = between;
-  out << "\n";
+  out << after << "\n";
+}
+
+const char* role_name(dem::BodyId id) {
+  return id == dem::BodyId::bottom_layer ? "bottom_layer"
+         : id == dem::BodyId::top_layer  ? "top_layer"
+                                         : "free";
+}
+
+std::vector<dem::BodyId> roles_in(const cases::CsvTable& table) {
+  std::vector<dem::BodyId> roles;
+  if (!table.has("role")) return roles;
+  for (const std::string& word : table.words("role")) {
+    const auto at = table.at(roles.size());
+    roles.push_back(dem::BodyId::none);
+    for (const dem::BodyId layer : {dem::BodyId::bottom_layer, dem::BodyId::top_layer})
+      if (word == role_name(layer)) roles.back() = layer;
+    if (word != role_name(roles.back()))
+      throw error(at, ": role = \"", word, "\"; expected free, bottom_layer or top_layer");
+  }
+  return roles;
 }
 
 void write_csv(std::ostream& out, const dem::State& s) {
-  out << "# m, m/s, rad/s\nid, x, y, z, r, vx, vy, vz, wx, wy, wz\n";
+  const bool layers = std::ranges::count(s.part_of, dem::BodyId::none) < s.size();
+  out << "# m, m/s, rad/s\nid, x, y, z, r, vx, vy, vz, wx, wy, wz" << (layers ? ", role\n" : "\n");
   for (dem::Index i = 0; i < s.size(); ++i) {
     const dem::Vec3d &x = s.x[i], &w = s.omega[i];
-    add(out, {double(s.id[i]), x.x, x.y, x.z, s.r[i], s.v[i].x, s.v[i].y, s.v[i].z, w.x, w.y, w.z}, ", ");
+    add(out, {double(s.id[i]), x.x, x.y, x.z, s.r[i], s.v[i].x, s.v[i].y, s.v[i].z, w.x, w.y, w.z}, ", ",
+        layers ? text(", ", role_name(s.part_of[i])) : "");
   }
 }
 
@@ -83,8 +105,8 @@ void write_vtk(std::ostream& out, const dem::State& s) {
 bool is_grain_table(const fs::path& start) { return start.extension() == ".csv"; }
 
 OwnGrains read_grain_table(const cases::Case& c) {
-  const cases::CsvTable table(c.start);
-  table.expect_only({"id", "x", "y", "z", "r", "vx", "vy", "vz", "wx", "wy", "wz"});
+  const cases::CsvTable table(c.start, {"role"});
+  table.expect_only({"id", "x", "y", "z", "r", "vx", "vy", "vz", "wx", "wy", "wz", "role"});
   for (int a = 0; a < 2; ++a)
     if (!((a == 0 ? c.box_x : c.box_y) > 0))
       throw error(c.start.string(), ": a table of grains has no box; expected box.", "xy"[a],
@@ -108,7 +130,7 @@ OwnGrains read_grain_table(const cases::Case& c) {
     }
   };
   vector(velocities, "m/s", s.v), vector(spins, "rad/s", s.omega);
-  OwnGrains own{c.start, std::move(s), {}, c.box_x, c.box_y, c.box_z};
+  OwnGrains own{c.start, std::move(s), {}, c.box_x, c.box_y, c.box_z, roles_in(table)};
   for (std::size_t row = 0; row < table.rows(); ++row) own.lines.push_back(table.line(row));
   return own;
 }
@@ -126,7 +148,7 @@ void export_grains(const fs::path& case_directory, const std::string& format, co
   dem::State s;
   for (const dem::Index i : order) {
     s.id.push_back(c.state.id[i]), s.r.push_back(c.state.r[i]), s.x.push_back(c.state.x[i]);
-    s.omega.push_back(c.state.omega[i]), s.v.push_back(c.state.v[i]);
+    s.omega.push_back(c.state.omega[i]), s.part_of.push_back(c.state.part_of[i]), s.v.push_back(c.state.v[i]);
   }
   std::ostringstream text;
   if (format == "csv") write_csv(text, s);

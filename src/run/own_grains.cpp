@@ -4,8 +4,10 @@
 
 #include "dem/touching.hpp"
 #include "error.hpp"
+#include "output/files.hpp"
 #include "run/grain_table.hpp"
 #include "run/lammps_data.hpp"
+#include "run/snapshot_grains.hpp"
 
 namespace moraine::run {
 
@@ -47,14 +49,19 @@ void expect_apart(const cases::Case& c, const OwnGrains& own) {
 
 }  // namespace
 
-std::string OwnGrains::at(dem::Index i) const { return text(file.string(), ", line ", lines[i]); }
+std::string OwnGrains::at(dem::Index i) const {
+  return lines.empty() ? text(file.string(), ", grain ", i) : text(file.string(), ", line ", lines[i]);
+}
 
 bool has_own_grains(const std::filesystem::path& start) {
-  return !start.empty() && (is_grain_table(start) || is_lammps_data(start));
+  return !start.empty() && (is_grain_table(start) || is_lammps_data(start) || output::is_snapshot(start));
 }
 
 OwnGrains read_own_grains(const cases::Case& c) {
-  OwnGrains own = is_grain_table(c.start) ? read_grain_table(c) : read_lammps_data(c);
+  OwnGrains own = is_grain_table(c.start)        ? read_grain_table(c)
+                  : output::is_snapshot(c.start) ? read_snapshot_grains(c)
+                                                 : read_lammps_data(c);
+  if (std::ranges::count(own.roles, dem::BodyId::none) == std::ssize(own.roles)) own.roles.clear();
   expect_inside(c, own);
   expect_apart(c, own);
   return own;

@@ -137,7 +137,7 @@ Start start_of(const cases::Case& c) {
   if (has_own_grains(c.start)) {
     OwnGrains own = read_own_grains(c);
     Start s{{}, own.box_x, own.box_y, own.box_z, 0};
-    s.before.state = std::move(own.state);
+    s.before.state = std::move(own.state), s.roles = std::move(own.roles), s.note = std::move(own.note);
     double volume = 0;
     for (const double r : s.before.state.r) volume += r * r * r;
     const double n = s.before.state.size();
@@ -280,13 +280,14 @@ void forget(const cases::Stage& stage, dem::State& s) {
 
 // Which grains are part of layers, and what displacement, strain and dilation are counted from; returns
 // warnings.
-std::vector<std::string> set_reference(const cases::Case& c, std::size_t index, output::Checkpoint& now) {
+std::vector<std::string> set_reference(const cases::Case& c, std::size_t index, const Start& start,
+                                       output::Checkpoint& now) {
   const cases::Stage& stage = c.stages[index];
   dem::State& s = now.state;
   std::vector<std::string> warnings;
   if (shears(stage.kind) && now.scene.has(BodyId::top_layer)) return asks_for_other_layers(c, index);
   if (shears(stage.kind)) {
-    warnings = choose_layers(stage, s);
+    warnings = start.roles.empty() ? choose_layers(stage, s) : take_layers(stage, start.roles, s);
   } else {
     std::fill(s.part_of.begin(), s.part_of.end(), BodyId::none);
     s.at(BodyId::bottom_layer) = s.at(BodyId::top_layer) = {};
@@ -346,7 +347,7 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, outpu
     s.at(BodyId::top_wall) = {};
   else if (s.wall_z() <= 0)
     s.wall_z() = bed_top(s);  // lowered onto the highest grain
-  const std::vector<std::string> warnings = set_reference(c, index, now);
+  const std::vector<std::string> warnings = set_reference(c, index, start, now);
   s.step = 0, s.staggered = false, s.ledger = {};
   s.water_force.clear(), s.water = {};
   dem::Scene scene = scene_of(c, stage, start, now.height_0);
