@@ -168,12 +168,15 @@ Start start_of(const cases::Case& c) {
   using Distribution = dem::Packing::Distribution;
   p.distribution = g.distribution == "uniform"     ? Distribution::uniform
                    : g.distribution == "lognormal" ? Distribution::lognormal
+                   : g.distribution == "bimodal"   ? Distribution::bimodal
                                                    : Distribution::ranges;
   if (g.distribution == "fractal") p.ranges = {{g.radius_min, g.radius_max, g.fractal_dimension, 1}};
   if (g.distribution == "sieves") p.ranges = dem::ranges_of(sieves_in(g.sieves));
   if (g.placement == "random") p.placement = dem::Packing::Placement::random;
   p.solid_fraction = g.solid_fraction, p.periodic_x = c.periodic_x, p.periodic_y = c.periodic_y;
   p.radius_mean = g.radius_mean, p.radius_std = g.radius_std;
+  p.fine_radius_mean = g.fine_radius_mean, p.fine_radius_std = g.fine_radius_std;
+  p.fine_fraction = g.fine_fraction;
   p.radius_min = g.radius_min, p.radius_max = g.radius_max;
   p.seed = g.seed, p.columns_x = g.columns_x, p.columns_y = g.columns_y, p.cell = g.cell;
   p.box_x = c.box_x, p.box_y = c.box_y;

@@ -170,5 +170,37 @@ TEST_F(GrainTable, AGradingThatIsNoneNamesItsFile) {
       {"grains.sieves", "expected the name of a CSV file"});
 }
 
+TEST_F(GrainTable, AMixtureIsDrawn) {
+  const fs::path c = make("mixed", R"([box]
+x = 0.1
+y = 0.1
+[grains]
+count = 3000
+distribution = "bimodal"
+radius_mean = "8 mm"
+radius_std = "0.5 mm"
+fine_radius_mean = "2 mm"
+fine_radius_std = "0.2 mm"
+fine_fraction = "30 %"
+placement = "random"
+columns_x = 4
+columns_y = 4
+[wall]
+gamma_n = 1
+gamma_t = 1
+[[stage]]
+name = "a"
+kind = "settle"
+duration = 1
+)");
+  const std::string said = moraine({"check", c.string()}).out;
+  EXPECT_NE(said.find("grains are wider than 0.008 m, 0.3"), std::string::npos) << said;
+  EXPECT_NE(said.find("(asked for: 0.3)"), std::string::npos) << said;
+  EXPECT_NE(moraine({"check", c.string(), "--set", "grains.placement=lattice"}).out.find("(asked for: 0.3)"),
+            std::string::npos);
+  expect_error({"check", c.string(), "--set", "grains.count=10"},
+               {"of 10 grains 0 would be of the coarse population", "28 grains or more (grains.count)"});
+}
+
 }  // namespace
 }  // namespace moraine
