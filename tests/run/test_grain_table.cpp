@@ -44,6 +44,13 @@ TEST_F(GrainTable, VelocitiesCountWhereTheStageKeepsThem) {
   EXPECT_NEAR(output::read_checkpoint(c / "output/checkpoint.h5").state.x[0].x, 0.02 + 0.5 * 0.01, 2e-5);
 }
 
+// Its time is judged with grains that move as fast as they do.
+TEST_F(GrainTable, FastGrainsAreTimed) {
+  const fs::path c = with_table("c", "x,y,z,r,vz\n0.02,0.03,0.01,0.005,-5\n0.06,0.03,0.05,0.005,-20\n");
+  const std::string said = moraine({"check", c.string(), "--set", "stage.fall.zero_kinematics=false"}).out;
+  EXPECT_NE(said.find("ms a step"), std::string::npos) << said;
+}
+
 TEST_F(GrainTable, SaysWhichRowIsWrong) {
   const std::string head = "x,y,z,r\n0.02,0.03,0.02,0.005\n";
   const auto expect = [&](const std::string& name, const std::string& table,
