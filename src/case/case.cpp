@@ -77,9 +77,18 @@ void check_case(const Entries& entries) {
   if (radii == "uniform" || radii == "fractal") {
     c.expect(r_min > 0, "grains.radius_min", "> 0 m for ", radii, " radii");
     c.expect(r_max >= r_min, "grains.radius_max", "at least grains.radius_min = ", r_min);
-  } else if (radii == "lognormal") {
+  } else if (radii == "lognormal" || radii == "bimodal") {
     c.expect(r_max == 0 || r_max >= r_min, "grains.radius_max",
              "0 m, or at least grains.radius_min = ", r_min);
+  }
+  for (const char* key : {"grains.fine_radius_mean", "grains.fine_radius_std", "grains.fine_fraction"})
+    c.expect(radii == "bimodal" || c.number(key) == 0, key, "0, or grains.distribution = \"bimodal\"");
+  if (radii == "bimodal") {
+    const double coarse = c.number("grains.radius_mean"), fine = c.number("grains.fine_radius_mean");
+    c.expect(fine > 0 && fine < coarse, "grains.fine_radius_mean",
+             "> 0 m and less than grains.radius_mean = ", coarse, ", that of the coarse grains");
+    c.expect(c.number("grains.fine_fraction") > 0 && c.number("grains.fine_fraction") < 1,
+             "grains.fine_fraction", "more than 0 and less than 1, by mass");
   }
   c.expect((radii == "sieves") == !c.text("grains.sieves").empty(), "grains.sieves",
            radii == "sieves" ? "the name of a CSV file" : "\"\", or grains.distribution = \"sieves\"");
@@ -203,7 +212,7 @@ fs::path start_file(const fs::path& directory, const Entry& entry) {
   }
   if (!fs::is_regular_file(path))
     throw error(entry.stated, ": there is no ", path.string(),
-                "; expected a finished case, a checkpoint or a table of grains, relative to ",
+                "; expected a finished case, a checkpoint or a file of grains, relative to ",
                 directory.string());
   return path;
 }

@@ -13,15 +13,17 @@ namespace moraine::cases {
 
 struct Grains {
   std::int64_t count;
-  std::string distribution;       // "lognormal", "uniform", "fractal", "sieves"
-  double radius_mean;             // m
-  double radius_std;              // m, lognormal
-  double radius_min, radius_max;  // m, uniform, fractal; limits of lognormal, 0: none
-  double fractal_dimension;       // fractal
-  std::filesystem::path sieves;   // a table of sizes and what is finer
-  std::string placement;          // "lattice", "random"
-  double solid_fraction;          // random
-  double density;                 // kg/m3
+  std::string distribution;                  // "lognormal", "uniform", "fractal", "sieves", "bimodal"
+  double radius_mean;                        // m
+  double radius_std;                         // m, lognormal; bimodal: of the coarse
+  double fine_radius_mean, fine_radius_std;  // m, bimodal
+  double fine_fraction;                      // bimodal: of the mass
+  double radius_min, radius_max;             // m, uniform, fractal; limits of lognormal and bimodal, 0: none
+  double fractal_dimension;                  // fractal
+  std::filesystem::path sieves;              // a table of sizes and what is finer
+  std::string placement;                     // "lattice", "random"
+  double solid_fraction;                     // random
+  double density;                            // kg/m3
   std::uint64_t seed;
   std::int64_t columns_x, columns_y;  // of the starting lattice
   double cell;                        // side of a lattice cell in largest grain diameters

@@ -33,7 +33,7 @@ std::vector<string> cells_of(const string& line) {
 
 }  // namespace
 
-CsvTable::CsvTable(const std::filesystem::path& file) : file_(file) {
+CsvTable::CsvTable(const std::filesystem::path& file, const std::vector<string>& of_words) : file_(file) {
   std::ifstream in(file);
   if (!in) throw error(file.string(), ": cannot be read");
   string line;
@@ -49,6 +49,7 @@ CsvTable::CsvTable(const std::filesystem::path& file) : file_(file) {
         const bool has_unit = open != cell.npos && close != cell.npos && close > open;
         Column column{trimmed(cell.substr(0, open)),
                       has_unit ? trimmed(cell.substr(open + 1, close - open - 1)) : "",
+                      {},
                       {}};
         if (column.name.empty() || std::isdigit(static_cast<unsigned char>(column.name[0])) ||
             column.name[0] == '-')
@@ -63,6 +64,10 @@ CsvTable::CsvTable(const std::filesystem::path& file) : file_(file) {
       throw error(here, ": ", cells.size(), " values; expected ", columns_.size(), ", one for each of ",
                   names());
     for (std::size_t c = 0; c < cells.size(); ++c) {
+      if (std::ranges::find(of_words, columns_[c].name) != of_words.end()) {
+        columns_[c].words.push_back(cells[c]);
+        continue;
+      }
       double value = 0;
       const char* const end = cells[c].data() + cells[c].size();
       const auto result = std::from_chars(cells[c].data() + (cells[c].starts_with("+") ? 1 : 0), end, value);
@@ -104,6 +109,8 @@ std::vector<double> CsvTable::column(const string& name, const string& unit) con
   for (double& value : values) value *= factor;
   return values;
 }
+
+const std::vector<string>& CsvTable::words(const string& name) const { return find(name)->words; }
 
 void CsvTable::expect_only(const std::vector<string>& names) const {
   for (const Column& column : columns_)

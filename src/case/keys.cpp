@@ -120,7 +120,7 @@ std::vector<Key> make_keys() {
       // clang-format off
       no_physics(row<&C::title>("title", "", "\"\"", "", "what the case is about")),
       {"extends", Type::text, "", "\"\"", "", "directory of a case whose keys and stages this one takes over", "", nullptr},
-      row<&C::start>("start", "", "\"\"", "", "where the grains come from: a finished case, a checkpoint file, or a table of grains NAME.csv with the columns x, y, z, r; empty: drawn, see grains"),
+      row<&C::start>("start", "", "\"\"", "", "where the grains come from: a finished case, a checkpoint file, a table of grains NAME.csv with the columns x, y, z, r, a LAMMPS data file NAME.data, or a snapshot; empty: drawn, see grains"),
       {"stages", Type::list, "", "[]", "", "names of the stages to run, in order; empty: all", "", nullptr},
 
       row<&C::box_x>("box.x", "m", "0", ">= 0", "side along the shear direction; 0: from the lattice or `start`"),
@@ -131,11 +131,14 @@ std::vector<Key> make_keys() {
       {"box.walls", Type::choice, "", "\"none\"", "none | x | y | xy", "fixed walls at both sides of an axis that is not periodic; as rough as the floor (wall.k_t, stage.wall_mu)", "", set_walls},
 
       row<grains, &G::count>("grains.count", "", "10000", "1 .. 2147483647", "number of grains"),
-      row<grains, &G::distribution>("grains.distribution", "", "\"lognormal\"", "lognormal | uniform | fractal | sieves", "of the radii"),
-      row<grains, &G::radius_mean>("grains.radius_mean", "m", "0.02", "> 0", "lognormal: mean radius"),
-      row<grains, &G::radius_std>("grains.radius_std", "m", "9.38e-5", ">= 0", "lognormal: standard deviation of the radius"),
-      row<grains, &G::radius_min>("grains.radius_min", "m", "0", ">= 0", "uniform, fractal: least radius; lognormal: smaller ones are drawn again"),
-      row<grains, &G::radius_max>("grains.radius_max", "m", "0", ">= 0", "uniform, fractal: largest radius; lognormal: larger ones are drawn again, 0: none"),
+      row<grains, &G::distribution>("grains.distribution", "", "\"lognormal\"", "lognormal | uniform | fractal | sieves | bimodal", "of the radii"),
+      row<grains, &G::radius_mean>("grains.radius_mean", "m", "0.02", "> 0", "lognormal: mean radius; bimodal: of the coarse grains"),
+      row<grains, &G::radius_std>("grains.radius_std", "m", "9.38e-5", ">= 0", "lognormal: standard deviation of the radius; bimodal: of the coarse grains"),
+      row<grains, &G::fine_radius_mean>("grains.fine_radius_mean", "m", "0", ">= 0", "bimodal: mean radius of the fine grains, which are log-normal, too"),
+      row<grains, &G::fine_radius_std>("grains.fine_radius_std", "m", "0", ">= 0", "bimodal: their standard deviation"),
+      row<grains, &G::fine_fraction>("grains.fine_fraction", "1", "0", ">= 0", "bimodal: their share of the mass"),
+      row<grains, &G::radius_min>("grains.radius_min", "m", "0", ">= 0", "uniform, fractal: least radius; lognormal: smaller ones are drawn again; bimodal: there are no smaller ones"),
+      row<grains, &G::radius_max>("grains.radius_max", "m", "0", ">= 0", "uniform, fractal: largest radius; lognormal: larger ones are drawn again, bimodal: there are none, 0: no limit"),
       row<grains, &G::fractal_dimension>("grains.fractal_dimension", "1", "2.6", "> 0", "fractal: as many grains are larger than r as r^-D; 3: the same mass at each size"),
       row<grains, &G::sieves>("grains.sieves", "", "\"\"", "", "sieves: a CSV file with the columns size (m) and finer (1, by mass), or other units: size (mm), finer (%)"),
       row<grains, &G::density>("grains.density", "kg/m3", "2600", "> 0", "of the grains"),

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <numeric>
 
@@ -74,6 +75,72 @@ std::vector<double> draw_radii(const std::vector<SizeRange>& ranges, std::int64_
     while (k + 1 < ranges.size() && u >= below + ranges[k].count) below += ranges[k++].count;
     r[i] = radius_at(ranges[k], std::clamp((u - below) / ranges[k].count, 0.0, 1.0));
   }
+  std::sort(r.begin(), r.end(), std::greater<>());
+  return r;
+}
+
+namespace {
+
+double normal_share(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }  // below z
+
+// Of a LogNormal: in z = (log r - mu)/sigma its radii are normal.
+class Population {
+ public:
+  explicit Population(const LogNormal& p) : of_(p) {
+    const double relative = p.std / p.mean, variance = std::log1p(relative * relative);
+    mu_ = std::log(p.mean) - 0.5 * variance, sigma_ = std::sqrt(variance);
+    const double most = p.r_max > 0 ? p.r_max : std::numeric_limits<double>::infinity();
+    if (sigma_ == 0 ? p.mean >= p.r_min && p.mean <= most : share(0) > 1e-4) return;
+    throw error("no radius around ", p.mean, " m lies between grains.radius_min = ", p.r_min,
+                " m and grains.radius_max = ", most, " m; expected limits around both means");
+  }
+
+  double mean_cube() const {  // m3
+    if (sigma_ == 0) return of_.mean * of_.mean * of_.mean;
+    return std::exp(3 * mu_ + 4.5 * sigma_ * sigma_) * share(3 * sigma_) / share(0);
+  }
+  void draw(std::int64_t n, Random& random, std::vector<double>& r) const {
+    const double below = normal_share(low()), between = share(0);
+    for (std::int64_t i = 0; i < n; ++i) {
+      const double u = (static_cast<double>(i) + random.uniform()) / static_cast<double>(n);
+      r.push_back(sigma_ == 0 ? of_.mean : at(below + u * between));
+    }
+  }
+
+ private:
+  static constexpr double far = 8.5;  // of z; beyond it lies nothing that a double could tell from 0 or 1
+  double low() const { return of_.r_min > 0 ? std::max((std::log(of_.r_min) - mu_) / sigma_, -far) : -far; }
+  double high() const { return of_.r_max > 0 ? std::min((std::log(of_.r_max) - mu_) / sigma_, far) : far; }
+  // Of the normal distribution about `shift`, between the limits.
+  double share(double shift) const { return normal_share(high() - shift) - normal_share(low() - shift); }
+  double at(double wanted) const {
+    double a = low(), b = high();
+    for (int k = 0; k < 60; ++k) {
+      const double z = 0.5 * (a + b);
+      (normal_share(z) < wanted ? a : b) = z;
+    }
+    const double r = std::exp(mu_ + sigma_ * 0.5 * (a + b));
+    return of_.r_max > 0 ? std::clamp(r, of_.r_min, of_.r_max) : std::max(r, of_.r_min);
+  }
+
+  LogNormal of_;
+  double mu_, sigma_;
+};
+
+}  // namespace
+
+std::vector<double> draw_mixture(const LogNormal& coarse, const LogNormal& fine, double fine_fraction,
+                                 std::int64_t n, Random& random) {
+  const Population large(coarse), small(fine);
+  const double larges = (1 - fine_fraction) / large.mean_cube(), smalls = fine_fraction / small.mean_cube();
+  const std::int64_t count = std::llround(static_cast<double>(n) * larges / (larges + smalls));
+  if (count < 1 || count >= n)
+    throw error("of ", n, " grains ", count, " would be of the coarse population and ", n - count,
+                " of the fine one; expected at least one of each: ",
+                std::ceil((larges + smalls) / std::min(larges, smalls)),
+                " grains or more (grains.count), or another ", "grains.fine_fraction than ", fine_fraction);
+  std::vector<double> r;
+  large.draw(count, random, r), small.draw(n - count, random, r);
   std::sort(r.begin(), r.end(), std::greater<>());
   return r;
 }

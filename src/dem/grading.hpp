@@ -38,6 +38,17 @@ std::vector<SizeRange> ranges_of(const std::vector<Sieve>& sieves);
 // largest grains are as many as they should be.
 std::vector<double> draw_radii(const std::vector<SizeRange>& ranges, std::int64_t n, Random& random);
 
+// Radii whose logarithm is normal, between two limits.
+struct LogNormal {
+  double mean, std;     // m, of the radii before the limits cut them
+  double r_min, r_max;  // m; r_max = 0: none
+};
+// n radii of two such populations, largest first, a fraction of whose mass is of the finer; each drawn from
+// equal shares as above. Throws Error where a population has no radius between its limits, or would have no
+// grain.
+std::vector<double> draw_mixture(const LogNormal& coarse, const LogNormal& fine, double fine_fraction,
+                                 std::int64_t n, Random& random);
+
 // What was drawn.
 struct GradingSummary {
   double d10, d50, d60, d90;  // m, a tenth ... of the mass is finer

@@ -97,6 +97,10 @@ class RandomPlaces {
 
 std::vector<double> draw(const Packing& p, Random& random) {
   if (p.distribution == Packing::Distribution::ranges) return draw_radii(p.ranges, p.count, random);
+  if (p.distribution == Packing::Distribution::bimodal)
+    return draw_mixture({p.radius_mean, p.radius_std, p.radius_min, p.radius_max},
+                        {p.fine_radius_mean, p.fine_radius_std, p.radius_min, p.radius_max}, p.fine_fraction,
+                        p.count, random);
   std::vector<double> r(p.count);
   const double relative = p.radius_std / p.radius_mean;
   const double variance = std::log(1 + relative * relative), mean = std::log(p.radius_mean) - 0.5 * variance;
@@ -174,7 +178,8 @@ LooseGrains make_loose_grains(const Packing& p) {
   Random random(p.seed);
   std::vector<double> r = draw(p, random);
   if (p.placement == Packing::Placement::random) return at_random_places(p, std::move(r), random);
-  if (p.distribution == Packing::Distribution::ranges)  // drawn by size
+  using Distribution = Packing::Distribution;
+  if (p.distribution == Distribution::ranges || p.distribution == Distribution::bimodal)  // drawn by size
     for (std::size_t i = r.size() - 1; i > 0; --i)
       std::swap(r[i], r[static_cast<std::size_t>(random.uniform() * static_cast<double>(i + 1))]);
   const double r_max = *std::max_element(r.begin(), r.end());

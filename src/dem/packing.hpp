@@ -9,13 +9,15 @@
 namespace moraine::dem {
 
 struct Packing {
-  enum class Distribution { lognormal, uniform, ranges };
+  enum class Distribution { lognormal, uniform, ranges, bimodal };
   enum class Placement { lattice, random };
   std::int64_t count = 10000;
   Distribution distribution = Distribution::lognormal;
-  double radius_mean = 0.02, radius_std = 9.38e-5;  // m, lognormal
+  double radius_mean = 0.02, radius_std = 9.38e-5;  // m, lognormal; bimodal: of the coarse
   double radius_min = 0, radius_max = 0;            // m, uniform; lognormal: what lies outside is drawn again
-  std::vector<SizeRange> ranges;                    // of ranges
+  double fine_radius_mean = 0, fine_radius_std = 0;  // m, bimodal
+  double fine_fraction = 0;                          // bimodal: of the mass
+  std::vector<SizeRange> ranges;                     // of ranges
   std::uint64_t seed = 1;
   Placement placement = Placement::lattice;
   std::int64_t columns_x = 10, columns_y = 10;  // lattice

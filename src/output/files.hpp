@@ -99,6 +99,21 @@ SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::s
                             const dem::Scene& scene, const dem::State& staggered,
                             const std::optional<coupling::WaterFields>& water = {},
                             const dem::Loads* loads = nullptr, const StageStart& start = {});
+// What a snapshot has to begin another case with; grains by id.
+struct Snapshot {
+  dem::Vec3d box;   // m
+  double top_wall;  // m; 0: none
+  std::vector<dem::BodyId> role;
+  std::vector<double> r;             // m
+  std::vector<dem::Vec3d> x, v;      // m, in the box; m/s
+  std::vector<dem::Vec3d> omega;     // rad/s, half a step earlier
+  std::vector<dem::Vec3d> rotation;  // rad
+  std::vector<dem::Index> i, j;      // of contacts, i < j
+  std::vector<dem::Vec3d> f_t;       // N, on i
+};
+bool is_snapshot(const std::filesystem::path& path);  // as its first lines say
+// Throws Error as read_checkpoint does.
+Snapshot read_snapshot(const std::filesystem::path& path);
 // snapshots/grains.xdmf and snapshots/contacts.xdmf: time series for ParaView (XDMF 3, Polyvertex with a
 // radius; contacts as points with force vectors). With pore water also water.xdmf, the grid's cells, and
 // bed.xdmf, grains and grid together. Rewritten whole; of snapshots of one time it lists the last.

@@ -9,6 +9,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <sstream>
 #include <string_view>
 
@@ -74,6 +75,17 @@ void seal(std::string& bytes, const std::string& kind, std::int64_t format) {
   bytes.replace(first_line, rest.size(), rest);
   const std::string digest = digest_of(std::string_view(bytes).substr(first_line));
   bytes.replace(0, first_line, std::string(mark) + digest + "\n");
+}
+
+std::string kind_of(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string head(seal_size, '\0');
+  file.read(head.data(), seal_size);
+  if (!head.starts_with(mark)) return {};
+  std::istringstream words(head.substr(first_line));
+  std::string kind;
+  words >> kind;
+  return kind;
 }
 
 Sealed read_sealed(const std::filesystem::path& path) {

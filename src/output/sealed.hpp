@@ -29,6 +29,8 @@ struct Sealed {
   std::int64_t format = 0;
   std::string bytes;  // without a seal the first of them only
 };
+// As the first lines say, unproved; none where the file has no seal or cannot be read.
+std::string kind_of(const std::filesystem::path& path);
 // Throws Damaged, or Error where the file cannot be opened.
 Sealed read_sealed(const std::filesystem::path& path);
 

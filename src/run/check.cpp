@@ -109,6 +109,21 @@ void check_case(const Options& options) {
         c.density_scaling, inertial_density / c.grains.density,
         std::pow(2 * c.density_scaling / sizes.smallest, 1.5));
   }
+  if (c.start.empty() && c.grains.distribution == "bimodal") {
+    // By the middle between the two: to see whether there are grains enough to meet what was asked for.
+    const double middle = std::sqrt(c.grains.radius_mean * c.grains.fine_radius_mean);
+    dem::Index coarse = 0;
+    double fine = 0;
+    for (const double r : state.r) r < middle ? fine += dem::sphere_volume(r) : ++coarse;
+    std::printf(
+        "  mixture       %d grains are wider than %.4g m, %.4g of the mass is finer (asked for: %.4g)\n",
+        coarse, 2 * middle, fine / volume, c.grains.fine_fraction);
+  }
+  if (!start.roles.empty())
+    std::printf("  roles         %td grains of bottom_layer, %td of top_layer\n",
+                std::ranges::count(start.roles, dem::BodyId::bottom_layer),
+                std::ranges::count(start.roles, dem::BodyId::top_layer));
+  if (!start.note.empty()) std::printf("  start         %s\n", start.note.c_str());
   std::printf("  memory        about %.0f MB\n", bytes_needed(n, c.has_water()) / 1e6);
 
   if (c.preset != "none" || c.softening != 1) {

@@ -155,12 +155,12 @@ double Estimate::per_step(const Stage& stage, dem::State bed, double speed) {
   scene.dt *= slower;
   for (dem::Body& body : scene.bodies)
     for (int a = 0; a < 3; ++a) body.along(a).velocity /= slower;
-  for (dem::Vec3d& v : bed.v) v = (1 / slower) * v;
+  double fastest = std::max({speed, std::abs(layer_velocity(stage.scene)), 1e-9});
+  for (dem::Vec3d& v : bed.v) fastest = std::max(fastest, std::sqrt(dot(v, v))), v = (1 / slower) * v;
   bed.v[bed.size() / 2] = {speed / slower, 0, 0};
   // As long as the bed is still what it was: none has moved by more than half a diameter (and none falls
   // through the floor).
   const std::int64_t least = std::max<std::int64_t>(1, scene.exchange_interval);
-  const double fastest = std::max({speed, std::abs(layer_velocity(stage.scene)), 1e-9});
   const auto most =
       static_cast<std::int64_t>(std::clamp(0.5 * stage.diameter / (fastest * stage.scene.dt), 1.0, 1e9));
   const std::int64_t limit = std::max(least, most / least * least);

@@ -1,15 +1,14 @@
 #include "run/grain_table.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <fstream>
 #include <iostream>
 #include <sstream>
 
 #include "case/csv.hpp"
-#include "dem/observe.hpp"
+#include "dem/engine.hpp"
 #include "dem/packing.hpp"
-#include "dem/touching.hpp"
+#include "dem/periodic_sides.hpp"
 #include "error.hpp"
 #include "output/files.hpp"
 
@@ -21,38 +20,6 @@ namespace {
 
 const std::vector<std::string> velocities = {"vx", "vy", "vz"}, spins = {"wx", "wy", "wz"};
 
-void expect_inside(const cases::Case& c, const cases::CsvTable& table, const dem::State& s) {
-  const double side[3] = {c.box_x, c.box_y, c.box_z};
-  const bool periodic[3] = {c.periodic_x, c.periodic_y, c.periodic_z};
-  const bool walls[3] = {c.walls_x, c.walls_y, c.floor};
-  for (dem::Index i = 0; i < s.size(); ++i)
-    for (int a = 0; a < 3; ++a) {
-      if (periodic[a] || !walls[a]) continue;
-      const double deepest = c.guards.max_overlap * s.r[i];
-      const double below = s.r[i] - s.x[i][a], above = a < 2 ? s.x[i][a] + s.r[i] - side[a] : below;
-      const double out = std::max(below, above);
-      if (out > deepest)
-        throw error(table.at(i), ": the grain at ", "xyz"[a], " = ", s.x[i][a], " m with r = ", s.r[i],
-                    " m is ", out, " m beyond ", a == 2 ? "the floor" : "a side wall", "; expected at most ",
-                    deepest, " m (guards.max_overlap)");
-    }
-}
-
-void expect_apart(const cases::Case& c, const cases::CsvTable& table, const dem::State& s) {
-  dem::Scene scene;
-  scene.box = {c.box_x, c.box_y, c.box_z};
-  scene.periodic_x = c.periodic_x, scene.periodic_y = c.periodic_y, scene.periodic_z = c.periodic_z;
-  std::vector<dem::GrainRow> rows(s.size(), dem::GrainRow{});
-  for (dem::Index i = 0; i < s.size(); ++i) rows[i].x = s.x[i], rows[i].r = rows[i].r_again = s.r[i];
-  dem::TouchingPairs().each(scene, rows.data(), s.size(), [&](dem::Index i, dem::Index j, double overlap) {
-    const double smaller = std::min(s.r[i], s.r[j]);
-    if (overlap <= c.guards.max_overlap * smaller) return;
-    throw error(table.at(std::min(i, j)), ": this grain overlaps that of ", table.at(std::max(i, j)), " by ",
-                overlap, " m, ", overlap / smaller, " of the smaller radius; expected at most ",
-                c.guards.max_overlap, " (guards.max_overlap)");
-  });
-}
-
 std::string digits(double x) {
   char text[32];
   std::snprintf(text, sizeof text, "%.17g", x);
@@ -60,22 +27,43 @@ std::string digits(double x) {
 }
 
 using Line = std::initializer_list<double>;
-void add(std::ostream& out, const Line& numbers, const char* between) {
+void add(std::ostream& out, const Line& numbers, const char* between, const std::string& after = {}) {
   const char* before = "";
   for (const double x : numbers) out << before << digits(x), before = between;
-  out << "\n";
+  out << after << "\n";
 }
 
-void write_csv(std::ostream& out, const dem::State& s, const std::vector<dem::Vec3d>& v) {
-  out << "# m, m/s, rad/s\nid, x, y, z, r, vx, vy, vz, wx, wy, wz\n";
+const char* role_name(dem::BodyId id) {
+  return id == dem::BodyId::bottom_layer ? "bottom_layer"
+         : id == dem::BodyId::top_layer  ? "top_layer"
+                                         : "free";
+}
+
+std::vector<dem::BodyId> roles_in(const cases::CsvTable& table) {
+  std::vector<dem::BodyId> roles;
+  if (!table.has("role")) return roles;
+  for (const std::string& word : table.words("role")) {
+    const auto at = table.at(roles.size());
+    roles.push_back(dem::BodyId::none);
+    for (const dem::BodyId layer : {dem::BodyId::bottom_layer, dem::BodyId::top_layer})
+      if (word == role_name(layer)) roles.back() = layer;
+    if (word != role_name(roles.back()))
+      throw error(at, ": role = \"", word, "\"; expected free, bottom_layer or top_layer");
+  }
+  return roles;
+}
+
+void write_csv(std::ostream& out, const dem::State& s) {
+  const bool layers = std::ranges::count(s.part_of, dem::BodyId::none) < s.size();
+  out << "# m, m/s, rad/s\nid, x, y, z, r, vx, vy, vz, wx, wy, wz" << (layers ? ", role\n" : "\n");
   for (dem::Index i = 0; i < s.size(); ++i) {
     const dem::Vec3d &x = s.x[i], &w = s.omega[i];
-    add(out, {double(s.id[i]), x.x, x.y, x.z, s.r[i], v[i].x, v[i].y, v[i].z, w.x, w.y, w.z}, ", ");
+    add(out, {double(s.id[i]), x.x, x.y, x.z, s.r[i], s.v[i].x, s.v[i].y, s.v[i].z, w.x, w.y, w.z}, ", ",
+        layers ? text(", ", role_name(s.part_of[i])) : "");
   }
 }
 
-void write_lammps(std::ostream& out, const dem::Scene& scene, const dem::State& s,
-                  const std::vector<dem::Vec3d>& v) {
+void write_lammps(std::ostream& out, const dem::Scene& scene, const dem::State& s) {
   dem::Vec3d low{0, 0, 0}, high = scene.box;
   for (int a = 0; a < 3; ++a)
     for (dem::Index i = 0; i < s.size(); ++i)
@@ -94,11 +82,11 @@ void write_lammps(std::ostream& out, const dem::Scene& scene, const dem::State& 
   out << "\nVelocities\n\n";
   for (dem::Index i = 0; i < s.size(); ++i) {
     out << s.id[i] + 1 << " ";
-    add(out, {v[i].x, v[i].y, v[i].z, s.omega[i].x, s.omega[i].y, s.omega[i].z}, " ");
+    add(out, {s.v[i].x, s.v[i].y, s.v[i].z, s.omega[i].x, s.omega[i].y, s.omega[i].z}, " ");
   }
 }
 
-void write_vtk(std::ostream& out, const dem::State& s, const std::vector<dem::Vec3d>& v) {
+void write_vtk(std::ostream& out, const dem::State& s) {
   out << "# vtk DataFile Version 3.0\ngrains, SI units\nASCII\nDATASET POLYDATA\nPOINTS " << s.size()
       << " double\n";
   for (const dem::Vec3d& x : s.x) add(out, {x.x, x.y, x.z}, " ");
@@ -107,7 +95,7 @@ void write_vtk(std::ostream& out, const dem::State& s, const std::vector<dem::Ve
   out << "POINT_DATA " << s.size() << "\nSCALARS radius double 1\nLOOKUP_TABLE default\n";
   for (const double r : s.r) out << digits(r) << "\n";
   out << "VECTORS velocity double\n";
-  for (const dem::Vec3d& u : v) add(out, {u.x, u.y, u.z}, " ");
+  for (const dem::Vec3d& u : s.v) add(out, {u.x, u.y, u.z}, " ");
   out << "VECTORS spin double\n";
   for (const dem::Vec3d& w : s.omega) add(out, {w.x, w.y, w.z}, " ");
 }
@@ -116,9 +104,9 @@ void write_vtk(std::ostream& out, const dem::State& s, const std::vector<dem::Ve
 
 bool is_grain_table(const fs::path& start) { return start.extension() == ".csv"; }
 
-dem::State read_grain_table(const cases::Case& c) {
-  const cases::CsvTable table(c.start);
-  table.expect_only({"id", "x", "y", "z", "r", "vx", "vy", "vz", "wx", "wy", "wz"});
+OwnGrains read_grain_table(const cases::Case& c) {
+  const cases::CsvTable table(c.start, {"role"});
+  table.expect_only({"id", "x", "y", "z", "r", "vx", "vy", "vz", "wx", "wy", "wz", "role"});
   for (int a = 0; a < 2; ++a)
     if (!((a == 0 ? c.box_x : c.box_y) > 0))
       throw error(c.start.string(), ": a table of grains has no box; expected box.", "xy"[a],
@@ -142,9 +130,9 @@ dem::State read_grain_table(const cases::Case& c) {
     }
   };
   vector(velocities, "m/s", s.v), vector(spins, "rad/s", s.omega);
-  expect_inside(c, table, s);
-  expect_apart(c, table, s);
-  return s;
+  OwnGrains own{c.start, std::move(s), {}, c.box_x, c.box_y, c.box_z, roles_in(table)};
+  for (std::size_t row = 0; row < table.rows(); ++row) own.lines.push_back(table.line(row));
+  return own;
 }
 
 void export_grains(const fs::path& case_directory, const std::string& format, const fs::path& file) {
@@ -153,20 +141,19 @@ void export_grains(const fs::path& case_directory, const std::string& format, co
     throw error(case_directory.string(), ": has no results yet; run it first: moraine run ",
                 case_directory.string());
   output::Checkpoint c = output::read_checkpoint(checkpoint);
-  const std::vector<dem::Vec3d> v = dem::velocity(c.scene, c.state);
+  dem::synchronise(c.scene, c.state);  // velocities and spins at the time of the places
   // By their ids, whatever the order in memory.
   std::vector<dem::Index> order(c.state.size());
   for (dem::Index i = 0; i < c.state.size(); ++i) order[c.state.id[i]] = i;
   dem::State s;
-  std::vector<dem::Vec3d> sorted;
   for (const dem::Index i : order) {
     s.id.push_back(c.state.id[i]), s.r.push_back(c.state.r[i]), s.x.push_back(c.state.x[i]);
-    s.omega.push_back(c.state.omega[i]), sorted.push_back(v[i]);
+    s.omega.push_back(c.state.omega[i]), s.part_of.push_back(c.state.part_of[i]), s.v.push_back(c.state.v[i]);
   }
   std::ostringstream text;
-  if (format == "csv") write_csv(text, s, sorted);
-  if (format == "lammps") write_lammps(text, c.scene, s, sorted);
-  if (format == "vtk") write_vtk(text, s, sorted);
+  if (format == "csv") write_csv(text, s);
+  if (format == "lammps") write_lammps(text, c.scene, s);
+  if (format == "vtk") write_vtk(text, s);
   if (file.empty()) {
     std::cout << text.str();
     return;

@@ -100,6 +100,20 @@ std::vector<std::string> choose_layers(const cases::Stage& stage, dem::State& s)
   return warnings_of(stage, l, s, height, text("a bed ", brief(height), " m high"), thinner);
 }
 
+std::vector<std::string> take_layers(const cases::Stage& stage, const std::vector<dem::BodyId>& roles,
+                                     dem::State& s) {
+  for (dem::Index i = 0; i < s.size(); ++i) s.part_of[i] = roles[s.id[i]];
+  for (const dem::BodyId needed : {dem::BodyId::top_layer, dem::BodyId::none})
+    if (std::ranges::find(roles, needed) == roles.end())
+      throw error("stage ", stage.name, ": no grain of the start has the role ",
+                  needed == dem::BodyId::none ? "free" : "top_layer", "; expected some to ",
+                  needed == dem::BodyId::none ? "deform" : "be driven",
+                  ", or no roles: then the layers go by height");
+  if (stage.bottom_layer < 0 && stage.top_layer < 0) return {};
+  return {"stage " + stage.name +
+          ": bottom_layer and top_layer do not count: the layers are the roles that the grains came with"};
+}
+
 std::vector<std::string> foresee_layers(const cases::Stage& stage, const dem::State& s, double area) {
   const Layers l = layers_of(stage, s);
   double volume = 0;

@@ -16,6 +16,11 @@ double mean_diameter(const dem::State& s);  // m
 // where a layer swallows all of it.
 std::vector<std::string> choose_layers(const cases::Stage& stage, dem::State& s);
 
+// The layers that the grains came with, by id; returns a warning where the stage asks for others. Throws
+// Error where no grain is driven or none is free.
+std::vector<std::string> take_layers(const cases::Stage& stage, const std::vector<dem::BodyId>& roles,
+                                     dem::State& s);
+
 // The same judgement of loose grains that have yet to become a bed, by their volume. area: m2, of the box.
 std::vector<std::string> foresee_layers(const cases::Stage& stage, const dem::State& s, double area);
 

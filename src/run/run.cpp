@@ -171,6 +171,7 @@ class Runner {
     progress_->say((resuming ? "resumed: " : "") +
                    (case_.title.empty() ? case_.directory.string() : case_.title) + ": " +
                    std::to_string(start_.before.state.size()) + " grains, " + engine_->describe());
+    if (!resuming && !start_.note.empty()) progress_->say(start_.note);
     for (const std::string& c : changes_) progress_->say("changed: " + c);
     for (const std::string& w : warnings_) progress_->say("warning: " + w);
     series_ = std::make_unique<output::Series>(files_.series(), now_.rows, case_.has_water());

@@ -10,8 +10,8 @@
 #include "dem/packing.hpp"
 #include "error.hpp"
 #include "output/sealed.hpp"
-#include "run/grain_table.hpp"
 #include "run/needs.hpp"
+#include "run/own_grains.hpp"
 #include "run/schedule.hpp"
 
 namespace moraine::run {
@@ -135,9 +135,10 @@ static std::vector<dem::Sieve> sieves_in(const std::filesystem::path& file) {
 }
 
 Start start_of(const cases::Case& c) {
-  if (is_grain_table(c.start)) {
-    Start s{{}, c.box_x, c.box_y, c.box_z, 0};
-    s.before.state = read_grain_table(c);
+  if (has_own_grains(c.start)) {
+    OwnGrains own = read_own_grains(c);
+    Start s{{}, own.box_x, own.box_y, own.box_z, 0};
+    s.before.state = std::move(own.state), s.roles = std::move(own.roles), s.note = std::move(own.note);
     double volume = 0;
     for (const double r : s.before.state.r) volume += r * r * r;
     const double n = s.before.state.size();
@@ -168,12 +169,15 @@ Start start_of(const cases::Case& c) {
   using Distribution = dem::Packing::Distribution;
   p.distribution = g.distribution == "uniform"     ? Distribution::uniform
                    : g.distribution == "lognormal" ? Distribution::lognormal
+                   : g.distribution == "bimodal"   ? Distribution::bimodal
                                                    : Distribution::ranges;
   if (g.distribution == "fractal") p.ranges = {{g.radius_min, g.radius_max, g.fractal_dimension, 1}};
   if (g.distribution == "sieves") p.ranges = dem::ranges_of(sieves_in(g.sieves));
   if (g.placement == "random") p.placement = dem::Packing::Placement::random;
   p.solid_fraction = g.solid_fraction, p.periodic_x = c.periodic_x, p.periodic_y = c.periodic_y;
   p.radius_mean = g.radius_mean, p.radius_std = g.radius_std;
+  p.fine_radius_mean = g.fine_radius_mean, p.fine_radius_std = g.fine_radius_std;
+  p.fine_fraction = g.fine_fraction;
   p.radius_min = g.radius_min, p.radius_max = g.radius_max;
   p.seed = g.seed, p.columns_x = g.columns_x, p.columns_y = g.columns_y, p.cell = g.cell;
   p.box_x = c.box_x, p.box_y = c.box_y;
@@ -280,13 +284,14 @@ void forget(const cases::Stage& stage, dem::State& s) {
 
 // Which grains are part of layers, and what displacement, strain and dilation are counted from; returns
 // warnings.
-std::vector<std::string> set_reference(const cases::Case& c, std::size_t index, output::Checkpoint& now) {
+std::vector<std::string> set_reference(const cases::Case& c, std::size_t index, const Start& start,
+                                       output::Checkpoint& now) {
   const cases::Stage& stage = c.stages[index];
   dem::State& s = now.state;
   std::vector<std::string> warnings;
   if (shears(stage.kind) && now.scene.has(BodyId::top_layer)) return asks_for_other_layers(c, index);
   if (shears(stage.kind)) {
-    warnings = choose_layers(stage, s);
+    warnings = start.roles.empty() ? choose_layers(stage, s) : take_layers(stage, start.roles, s);
   } else {
     std::fill(s.part_of.begin(), s.part_of.end(), BodyId::none);
     s.at(BodyId::bottom_layer) = s.at(BodyId::top_layer) = {};
@@ -346,7 +351,7 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, outpu
     s.at(BodyId::top_wall) = {};
   else if (s.wall_z() <= 0)
     s.wall_z() = bed_top(s);  // lowered onto the highest grain
-  const std::vector<std::string> warnings = set_reference(c, index, now);
+  const std::vector<std::string> warnings = set_reference(c, index, start, now);
   s.step = 0, s.staggered = false, s.ledger = {};
   s.water_force.clear(), s.water = {};
   dem::Scene scene = scene_of(c, stage, start, now.height_0);

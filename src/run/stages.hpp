@@ -17,8 +17,10 @@ namespace moraine::run {
 struct Start {
   output::Checkpoint
       before;  // the grains, and how an earlier case has left them (scene.dt = 0: there was none)
-  double box_x, box_y, box_z;  // m
-  double wall_mass;            // kg
+  double box_x, box_y, box_z;        // m
+  double wall_mass;                  // kg
+  std::vector<dem::BodyId> roles{};  // by id: the layers of stages that shear; empty: by height
+  std::string note{};                // for the log, about the grains
 };
 // Draws the grains, or reads them from case.start.
 Start start_of(const cases::Case& c);

@@ -372,10 +372,10 @@ TEST_F(CaseTest, wrong_values_say_what_was_expected) {
   EXPECT_EQ(fault_of("[grains]\ncount = 1.5\n"), "x/case.toml:2: grains.count = 1.5: expected an integer");
   EXPECT_EQ(fault_of("[grains]\ncount = \"1\"\n"),
             "x/case.toml:2: grains.count = \"1\": expected an integer");
-  EXPECT_EQ(
-      fault_of("[grains]\ndistribution = \"log-normal\"\n"),
-      "x/case.toml:2: grains.distribution = \"log-normal\": expected lognormal | uniform | fractal | sieves; "
-      "did you mean lognormal?");
+  EXPECT_EQ(fault_of("[grains]\ndistribution = \"log-normal\"\n"),
+            "x/case.toml:2: grains.distribution = \"log-normal\": expected lognormal | uniform | fractal | "
+            "sieves | bimodal; "
+            "did you mean lognormal?");
   EXPECT_EQ(fault_of("[box]\nfloor = 1\n"), "x/case.toml:2: box.floor = 1: expected true or false");
   EXPECT_EQ(fault_of("title = 1\n"), "x/case.toml:1: title = 1: expected a text in quotes");
   EXPECT_EQ(fault_of("model = 1\n"), "x/case.toml:1: model = 1: expected a table, [model]");
@@ -395,7 +395,7 @@ TEST_F(CaseTest, missing_files) {
       "x/case.toml:1: extends = \"../nowhere\": expected a directory that holds a case.toml, relative to x");
   EXPECT_EQ(fault_of("start = \"../nowhere\"\n" + shear),
             "x/case.toml:1: start = \"../nowhere\": there is no nowhere; expected a finished case, a "
-            "checkpoint or a table of "
+            "checkpoint or a file of "
             "grains, relative to x");
   write(settle, "bed");
   EXPECT_EQ(fault_of("start = \"../bed\"\n" + shear),
@@ -504,6 +504,19 @@ TEST_F(CaseTest, relations_between_keys) {
             "x/case.toml:4: grains.radius_max = 1: expected at least grains.radius_min = 2");
   EXPECT_EQ(fault_of("[grains]\ndistribution = \"uniform\"\n" + settle),
             "x/case.toml: grains.radius_min = 0.0 (by default): expected > 0 m for uniform radii");
+  const std::string mixed = "[grains]\ndistribution = \"bimodal\"\n", fine = "fine_radius_mean = 0.005\n";
+  EXPECT_EQ(fault_of(mixed + settle),
+            "x/case.toml: grains.fine_radius_mean = 0.0 (by default): expected > 0 m and less than "
+            "grains.radius_mean = 0.02, that of the coarse grains");
+  EXPECT_EQ(
+      fault_of(mixed + "fine_radius_mean = 0.03\nfine_fraction = 0.3\n" + settle),
+      "x/case.toml:3: grains.fine_radius_mean = 0.03: expected > 0 m and less than grains.radius_mean = "
+      "0.02, that of the coarse grains");
+  EXPECT_EQ(fault_of(mixed + fine + "fine_fraction = 1\n" + settle),
+            "x/case.toml:4: grains.fine_fraction = 1: expected more than 0 and less than 1, by mass");
+  EXPECT_EQ(
+      fault_of("[grains]\n" + fine + settle),
+      "x/case.toml:2: grains.fine_radius_mean = 0.005: expected 0, or grains.distribution = \"bimodal\"");
   EXPECT_EQ(fault_of("[box]\nperiodic = \"xyz\"\n" + settle),
             "x/case.toml: box.z = 0.0 (by default): expected > 0 m where z is periodic");
   EXPECT_EQ(

@@ -93,5 +93,81 @@ TEST(Grading, RefusesWhatIsNone) {
   expect_refused({{1e-3, 0}, {2e-3, 1.2}}, "120 % finer; expected 0 to 100");
 }
 
+// Two populations: mass of each, means and spreads, and the same for few grains.
+TEST(Grading, MixturesHaveTheirFractions) {
+  const LogNormal coarse{10e-3, 1e-3, 0, 0}, fine{2e-3, 0.4e-3, 0, 0};
+  for (const double fraction : {0.1, 0.3, 0.7}) {
+    Random random(5);
+    const std::vector<double> r = draw_mixture(coarse, fine, fraction, 50000, random);
+    ASSERT_EQ(r.size(), 50000u);
+    EXPECT_TRUE(std::is_sorted(r.rbegin(), r.rend()));
+    EXPECT_NEAR(finer(r, 10e-3), fraction, 0.003);
+    double sum = 0, squares = 0, n = 0;
+    for (const double radius : r)
+      if (radius < 5e-3) sum += radius, squares += radius * radius, ++n;
+    EXPECT_NEAR(sum / n, 2e-3, 1e-6);
+    EXPECT_NEAR(std::sqrt(squares / n - sum / n * sum / n), 0.4e-3, 2e-6);
+    EXPECT_NEAR(finer(draw_mixture(coarse, fine, fraction, 2000, random), 10e-3), fraction, 0.03);
+  }
+}
+
+TEST(Grading, MixturesOfEqualGrains) {
+  Random random(6);
+  const std::vector<double> r = draw_mixture({8e-3, 0, 0, 0}, {1e-3, 0, 0, 0}, 0.25, 15370, random);
+  EXPECT_EQ(std::count(r.begin(), r.end(), 8e-3), 90);  // of 0.75/512 to 0.25
+  EXPECT_EQ(std::count(r.begin(), r.end(), 1e-3), 15280);
+}
+
+// Limits cut both, and the fraction is of what is left.
+TEST(Grading, MixturesKeepTheirLimits) {
+  const double low = 1.5e-3, high = 11e-3;
+  Random random(7);
+  const std::vector<double> r =
+      draw_mixture({10e-3, 3e-3, low, high}, {2e-3, 1e-3, low, high}, 0.4, 50000, random);
+  EXPECT_LE(r.front(), high);
+  EXPECT_GE(r.back(), low);
+  EXPECT_GT(r.front(), 0.99 * high);
+  EXPECT_LT(r.back(), 1.01 * low);
+  // What each makes alone has the mass that the fraction says: so many are of the coarse.
+  Random again(7);
+  double coarse = 0, fine = 0;
+  const auto alone = [&](double mean, double std, double& mass) {  // drawn again where outside
+    const double variance = std::log1p(std * std / mean / mean);
+    std::int64_t n = 0;
+    for (int k = 0; k < 400000; ++k) {
+      const double x = std::exp(std::log(mean) - variance / 2 + std::sqrt(variance) * again.normal());
+      if (x >= low && x <= high) mass += x * x * x, ++n;
+    }
+    mass /= static_cast<double>(n);
+  };
+  alone(10e-3, 3e-3, coarse), alone(2e-3, 1e-3, fine);
+  double all = 0;
+  for (const double radius : r) all += radius * radius * radius;
+  // n_f V_f + n_c V_c = all, n_f + n_c = n, and n_f V_f = 0.4 all.
+  const double n = 50000, n_f = (n * coarse - all) / (coarse - fine);
+  EXPECT_NEAR(n_f * fine / all, 0.4, 0.01);
+}
+
+TEST(Grading, WhatIsNoMixture) {
+  Random random(1);
+  const auto fault = [&](const LogNormal& coarse, const LogNormal& fine, double fraction, std::int64_t n) {
+    try {
+      draw_mixture(coarse, fine, fraction, n, random);
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(fault({10e-3, 0, 0, 0}, {1e-3, 0, 0, 0}, 0.5, 100),
+            "of 100 grains 0 would be of the coarse population and 100 of the fine one; expected at least "
+            "one of each: "
+            "1001 grains or more (grains.count), or another grains.fine_fraction than 0.5");
+  EXPECT_NE(fault({10e-3, 1e-4, 0, 8e-3}, {1e-3, 0, 0, 8e-3}, 0.5, 100)
+                .find("no radius around 0.01 m lies between"),
+            std::string::npos);
+  EXPECT_NE(fault({10e-3, 0, 2e-3, 0}, {1e-3, 0, 2e-3, 0}, 0.5, 100).find("no radius around 0.001 m"),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace moraine::dem

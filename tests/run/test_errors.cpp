@@ -187,7 +187,7 @@ TEST_F(Errors, StartFiles) {
   const fs::path small = make("small", small_case());
   const auto words = [&](const std::string& start) { return to_run(small, {"start=" + start}); };
   expect_error(words("../nowhere"),
-               {"start=../nowhere", "there is no", "a finished case, a checkpoint or a table of grains"});
+               {"start=../nowhere", "there is no", "a finished case, a checkpoint or a file of grains"});
   make("not-run", small_case());
   expect_error(words("../not-run"), {"start=../not-run", "run that case first"});
   directory.write("text.h5", "no HDF5 file");

@@ -2,8 +2,8 @@
 #include "run/grain_table.hpp"
 
 #include "case/case.hpp"
+#include "dem/engine.hpp"
 #include "dem/grading.hpp"
-#include "dem/observe.hpp"
 #include "output/files.hpp"
 #include "program.hpp"
 #include "run/stages.hpp"
@@ -44,6 +44,13 @@ TEST_F(GrainTable, VelocitiesCountWhereTheStageKeepsThem) {
   EXPECT_NEAR(output::read_checkpoint(c / "output/checkpoint.h5").state.x[0].x, 0.02 + 0.5 * 0.01, 2e-5);
 }
 
+// Its time is judged with grains that move as fast as they do.
+TEST_F(GrainTable, FastGrainsAreTimed) {
+  const fs::path c = with_table("c", "x,y,z,r,vz\n0.02,0.03,0.01,0.005,-5\n0.06,0.03,0.05,0.005,-20\n");
+  const std::string said = moraine({"check", c.string(), "--set", "stage.fall.zero_kinematics=false"}).out;
+  EXPECT_NE(said.find("ms a step"), std::string::npos) << said;
+}
+
 TEST_F(GrainTable, SaysWhichRowIsWrong) {
   const std::string head = "x,y,z,r\n0.02,0.03,0.02,0.005\n";
   const auto expect = [&](const std::string& name, const std::string& table,
@@ -79,19 +86,19 @@ TEST_F(GrainTable, OfAnExportedBedHasItsBits) {
   fs::create_directories(directory.path() / "again");
   ASSERT_EQ(moraine({"export", bed.string(), "--output", table}).status, 0);
   expect_error({"export", bed.string(), "--output", table}, {"is there already"});
-  const output::Checkpoint before = output::read_checkpoint(bed / "output/checkpoint.h5");
+  output::Checkpoint before = output::read_checkpoint(bed / "output/checkpoint.h5");
   const dem::Scene& scene = before.scene;
+  dem::synchronise(scene, before.state);
   const fs::path again = make("again", "start = \"grains.csv\"\n[box]\nx = " + std::to_string(scene.box.x) +
                                            "\ny = " + std::to_string(scene.box.y) +
                                            "\n[[stage]]\nname = \"a\"\nkind = \"settle\"\nduration = 1\n");
   const dem::State s = run::start_of(cases::load(again)).before.state;
-  const std::vector<dem::Vec3d> v = dem::velocity(scene, before.state);
   ASSERT_EQ(s.size(), before.state.size());
   for (dem::Index i = 0; i < s.size(); ++i) {
     const dem::Index j = before.state.id[i];
     EXPECT_EQ(s.x[j], before.state.x[i]);
     EXPECT_EQ(s.r[j], before.state.r[i]);
-    EXPECT_EQ(s.v[j], v[i]);
+    EXPECT_EQ(s.v[j], before.state.v[i]);
     EXPECT_EQ(s.omega[j], before.state.omega[i]);
   }
 }
@@ -168,6 +175,38 @@ TEST_F(GrainTable, AGradingThatIsNoneNamesItsFile) {
             "[grains]\ndistribution = \"sieves\"\n[[stage]]\nname = \"a\"\nkind = \"settle\"\nduration = 1\n")
            .string()},
       {"grains.sieves", "expected the name of a CSV file"});
+}
+
+TEST_F(GrainTable, AMixtureIsDrawn) {
+  const fs::path c = make("mixed", R"([box]
+x = 0.1
+y = 0.1
+[grains]
+count = 3000
+distribution = "bimodal"
+radius_mean = "8 mm"
+radius_std = "0.5 mm"
+fine_radius_mean = "2 mm"
+fine_radius_std = "0.2 mm"
+fine_fraction = "30 %"
+placement = "random"
+columns_x = 4
+columns_y = 4
+[wall]
+gamma_n = 1
+gamma_t = 1
+[[stage]]
+name = "a"
+kind = "settle"
+duration = 1
+)");
+  const std::string said = moraine({"check", c.string()}).out;
+  EXPECT_NE(said.find("grains are wider than 0.008 m, 0.3"), std::string::npos) << said;
+  EXPECT_NE(said.find("(asked for: 0.3)"), std::string::npos) << said;
+  EXPECT_NE(moraine({"check", c.string(), "--set", "grains.placement=lattice"}).out.find("(asked for: 0.3)"),
+            std::string::npos);
+  expect_error({"check", c.string(), "--set", "grains.count=10"},
+               {"of 10 grains 0 would be of the coarse population", "28 grains or more (grains.count)"});
 }
 
 }  // namespace

@@ -1,0 +1,42 @@
+#include "run/snapshot_grains.hpp"
+
+#include "dem/packing.hpp"
+#include "error.hpp"
+#include "output/files.hpp"
+#include "output/sealed.hpp"
+
+namespace moraine::run {
+
+OwnGrains read_snapshot_grains(const cases::Case& c) {
+  output::Snapshot snapshot;
+  try {
+    snapshot = output::read_snapshot(c.start);
+  } catch (const output::Damaged& e) {
+    throw error(e.what(), "; expected an undamaged copy, or another snapshot");
+  }
+  if (snapshot.r.empty()) throw error(c.start.string(), ": has no grains");
+  const auto side = [](double wanted, double found) { return wanted > 0 ? wanted : found; };
+  OwnGrains own{c.start,
+                dem::grains_at_rest(std::move(snapshot.r), std::move(snapshot.x)),
+                {},
+                side(c.box_x, snapshot.box.x),
+                side(c.box_y, snapshot.box.y),
+                side(c.box_z, snapshot.box.z)};
+  dem::State& s = own.state;
+  s.v = std::move(snapshot.v), s.omega = std::move(snapshot.omega);
+  s.rotation = std::move(snapshot.rotation);
+  s.wall_z() = snapshot.top_wall;
+  own.roles = std::move(snapshot.role);
+  for (std::size_t k = 0; k < snapshot.i.size() && c.contact.k_t > 0; ++k) {
+    dem::Contact contact{snapshot.i[k], snapshot.j[k], {}};
+    contact.spring.delta_t = -1 / c.contact.k_t * snapshot.f_t[k];
+    s.contacts.push_back(contact);
+  }
+  own.note =
+      text("the grains are those of a snapshot, ", c.start.filename().string(),
+           ": springs bear its tangential forces; it knows no springs at walls and no speed of the top "
+           "wall, so that the run that it comes from would go on with other bits");
+  return own;
+}
+
+}  // namespace moraine::run
