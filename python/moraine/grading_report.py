@@ -316,7 +316,7 @@ def chains_figure(runs):
             ax.add_patch(plt.Circle((px, pz), q, fc="0.93", ec="0.75", lw=0.25, zorder=1))
         net = forces.network(s, thickness=slice_)
         unit = top * r.d50**2  # N
-        ax.add_collection(LineCollection(net.segments, linewidths=np.clip(2.0 * net.force / unit, 0.05, 6), colors=look_of(runs)[r.grading]["color"], zorder=2))
+        ax.add_collection(LineCollection(net.segments, linewidths=np.clip(net.force / unit, 0.05, 4), colors=look_of(runs)[r.grading]["color"], zorder=2))
         ax.set(aspect="equal", xlim=(0, s.box[0]), ylim=(0, s.top_wall), title=gradings[r.grading], xlabel="x (m)")
         panel(ax, letter)
     axes[0, 0].set_ylabel("z (m)")

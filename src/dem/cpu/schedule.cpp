@@ -244,14 +244,31 @@ LoadRow* Schedule::Buffers::take(Index rows) {
   return taken;
 }
 
+namespace {
+
+// What a step of the chunk takes, in near pairs: a grain to be moved is some 0.3 of them.
+double work(const Chunk& c) {
+  return 0.3 * (c.end - c.begin) + static_cast<double>(c.near[0].count + c.near[1].count);
+}
+
+// Stretches of chunks with about as much work each: chunks with large grains have many pairs.
+void deal_by_work(std::vector<Chunk>& chunks, int threads) {
+  double all = 0, before = 0;
+  for (const Chunk& c : chunks) all += work(c);
+  for (Chunk& c : chunks) {
+    c.owner = std::min(threads - 1, static_cast<int>(threads * (before + 0.5 * work(c)) / all));
+    before += work(c);
+  }
+}
+
+}  // namespace
+
 Schedule::Schedule(Bed& bed, int threads)
     : bed_(bed),
       threads_(threads),
       progress_(std::make_unique<Progress[]>(bed.chunks.size())),
       buffers_(threads) {
-  const std::size_t chunks = bed.chunks.size();
-  for (int t = 0; t < threads; ++t)
-    for (std::size_t c = chunks * t / threads; c < chunks * (t + 1) / threads; ++c) bed.chunks[c].owner = t;
+  deal_by_work(bed.chunks, threads);
   if (bed.uses.water)
     for (Buffers& b : buffers_) b.push.resize(bed.order.chunk);
 }
