@@ -61,18 +61,20 @@ struct Fluid {
 struct Stage {
   enum class FluidTop { drained, impermeable };
   enum class FluidBottom { no_flow, pressure, flux };
-  enum class Kind { settle, consolidate, shear, shear_stress, uniaxial };
+  enum class Kind { settle, consolidate, shear, shear_stress, uniaxial, press };
   enum class TopWall { automatic, stress, fixed, none };
   std::string name;
   Kind kind;
   double duration;       // s; 0 where `strain` is given
   double strain;         // shear strain u t/H_0, or axial strain for uniaxial; 0 where `duration` is given
-  TopWall top_wall;      // automatic: none for settle, prescribed for uniaxial, else stress
+  TopWall top_wall;      // automatic: none for settle and press, prescribed for uniaxial, else stress
   double normal_stress;  // Pa
   double normal_stress_amplitude, normal_stress_frequency, normal_stress_phase;  // Pa, Hz, rad
   double velocity;      // m/s, of the top layer; 0 where strain_rate is given
-  double strain_rate;   // 1/s; times the bed height gives the velocity (shear), or axial rate (uniaxial)
+  double strain_rate;   // 1/s; times the bed height gives the velocity (shear), axial (uniaxial), of each side (press)
   double shear_stress;  // Pa, for shear_stress
+  double porosity;      // 1, that a press ends with; 0 where pressure is given
+  double pressure;      // Pa, on all sides of a pressed box; 0 where porosity is given
   double layer_mass;    // kg, that the shear stress moves besides the grains of the layer
   double bottom_layer, top_layer;  // m, thickness by grain centres; negative: one largest diameter
   bool hold_layer_height;

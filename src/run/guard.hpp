@@ -21,7 +21,7 @@ namespace moraine::run {
 
 class Guard {
  public:
-  // `rows`: the series so far, with at least the first row of this stage.
+  // `rows`: the series so far, with at least the first row of this stage. Stage and start have to outlive it.
   Guard(const cases::Guards& limits, const Stage& stage, const std::vector<output::Row>& rows,
         const output::StageStart& start);
 
@@ -36,7 +36,7 @@ class Guard {
   cases::Guards limits_;
   const Stage& stage_;  // whose step may change meanwhile
   output::Row first_;   // of the stage
-  output::StageStart start_;
+  const output::StageStart& start_;  // a press moves what rows count from
   double most_put_in_ = 0;  // J
 };
 

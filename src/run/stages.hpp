@@ -17,7 +17,7 @@ namespace moraine::run {
 struct Start {
   output::Checkpoint
       before;  // the grains, and how an earlier case has left them (scene.dt = 0: there was none)
-  double box_x, box_y, box_z;  // m
+  double box_x, box_y, box_z;  // m, of the first stage; the later ones have what it leaves
   double wall_mass;            // kg
 };
 // Draws the grains, or reads them from case.start.
@@ -35,7 +35,8 @@ struct Stage {
   double series_interval, snapshot_interval;  // s
   double height_0;                            // m, H_0 of strain and dilation
   double diameter;                            // m, mean of the grains
-  double strain_rate;                         // 1/s, nominal: u/H_0, or axial
+  double strain_rate;                         // 1/s, nominal: u/H_0, axial, or of each side
+  double porosity, pressure;                  // 1, Pa: what a press is after; the other one is 0
   std::vector<std::string> warnings;
 
   double time(std::int64_t step) const { return scene.time(step) - first_time; }  // s, since it began
