@@ -11,7 +11,7 @@ namespace {
 
 // Of the way to the wanted stress that the contact network says, a jump takes this share: collisions of
 // loose grains and the swings after a jump are averaged over some ten jumps.
-constexpr double gain = 0.1;
+constexpr double gain = 0.5;
 
 // To the wanted porosity at an even rate; all in the last jump but one, so that the end comes as asked for.
 dem::Vec3d to_porosity(const Stage& stage, const dem::State& s, double ahead) {

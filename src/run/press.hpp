@@ -6,7 +6,7 @@
 
 namespace moraine::run {
 
-constexpr std::int64_t steps_between_presses = 20;  // of the scene's clock, jumps are at multiples of this
+constexpr std::int64_t steps_between_presses = 50;  // of the scene's clock, jumps are at multiples of this
 
 bool presses(const Stage& stage);
 
