@@ -328,6 +328,10 @@ bool Case::has_water() const {
   return std::any_of(stages.begin(), stages.end(), [](const Stage& s) { return s.fluid; });
 }
 
+bool Case::presses() const {
+  return std::any_of(stages.begin(), stages.end(), [](const Stage& s) { return s.kind == Stage::Kind::press; });
+}
+
 Case load(const fs::path& directory, const std::vector<Override>& overrides) {
   try {
     return load_checked(directory, overrides);

@@ -137,6 +137,7 @@ struct Case {
   Guards guards;
 
   bool has_water() const;  // in any stage
+  bool presses() const;    // in any stage
   std::string resolved;    // the merged case.toml, SI numbers, ready to be written and read again
   bool operator==(const Case&) const = default;
 };

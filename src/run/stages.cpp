@@ -92,6 +92,16 @@ output::Checkpoint read_start(const std::filesystem::path& path) {
   }
 }
 
+// A press has changed the sides that the case was given.
+void expect_same_box(const cases::Case& c, const dem::Scene& scene) {
+  const dem::Vec3d given{c.box_x, c.box_y, c.box_z};
+  if (!scene.is_periodic() || !c.periodic_z) return;
+  for (int a = 0; a < 3; ++a)
+    if (given[a] > 0 && std::abs(given[a] - scene.box[a]) > 1e-9 * scene.box[a])
+      throw error(c.start.string(), ": its grains fill a box of ", scene.box[a], " m along ", "xyz"[a],
+                  ", not of box.", "xyz"[a], " = ", given[a], " m; expected 0, to take that of `start`");
+}
+
 }  // namespace
 
 bool shears(Kind k) { return k == Kind::shear || k == Kind::shear_stress; }
@@ -154,6 +164,7 @@ Start start_of(const cases::Case& c) {
     s.before.rows.clear(), s.before.snapshots.clear();
     s.before.stage = 0, s.before.start.time = 0, s.before.finished = false;
     const dem::Scene& scene = s.before.scene;
+    expect_same_box(c, scene);
     if (s.box_x <= 0) s.box_x = scene.box.x;
     if (s.box_y <= 0) s.box_y = scene.box.y;
     if (s.box_z <= 0) s.box_z = scene.box.z;
