@@ -100,8 +100,10 @@ void check_case(const Entries& entries) {
     c.expect(periodic == "none" || periodic.find(axis) == string::npos, "box.walls", "none along ", axis,
              ", which is periodic (box.periodic = \"", periodic, "\")");
   if (c.text("box.periodic").find('z') != string::npos) {
-    c.expect(c.number("box.z") > 0 || !c.text("start").empty() || c.text("grains.placement") == "random",
-             "box.z", "> 0 m where z is periodic");
+    const string start = c.text("start");
+    const bool of_start = !start.empty() && !start.ends_with(".csv");
+    const bool by_fraction = start.empty() && c.text("grains.placement") == "random";
+    c.expect(c.number("box.z") > 0 || of_start || by_fraction, "box.z", "> 0 m where z is periodic");
     c.expect(!c.flag("box.floor"), "box.floor", "false where z is periodic");
   }
 }
@@ -144,9 +146,6 @@ void check_press(const Reader& s, const Reader& above) {
   s.expect(to_porosity != (s.number("stage.pressure") > 0), to_porosity ? "stage.pressure" : "stage.porosity",
            "either porosity or pressure");
   s.expect(s.number("stage.strain_rate") > 0, "stage.strain_rate", "> 0 1/s");
-  if (to_porosity)
-    s.expect(s.number("stage.duration") == 0, "stage.duration",
-             "0 s: porosity and strain_rate say when a press ends");
 }
 
 void check_stage(const Entries& entries, const Entries& above, const Context& context) {
@@ -163,9 +162,14 @@ void check_stage(const Entries& entries, const Entries& above, const Context& co
 
   const bool by_strain = s.number("stage.strain") != 0;
   if (kind == "press") check_press(s, Reader(above));
-  if (s.number("stage.porosity") == 0)
+  if (s.number("stage.porosity") > 0) {
+    for (const char* key : {"stage.duration", "stage.strain"})
+      s.expect(s.number(key) == 0, key, "0: porosity and strain_rate say when the stage ends");
+    s.expect(s.number("stage.strain_rate") > 0, "stage.strain_rate", "> 0 1/s, towards a lower porosity");
+  } else {
     s.expect(by_strain != (s.number("stage.duration") != 0), by_strain ? "stage.strain" : "stage.duration",
-           kind == "shear" || kind == "uniaxial" ? "either duration or strain" : "a duration > 0 s");
+             kind == "shear" || kind == "uniaxial" ? "either duration or strain" : "a duration > 0 s");
+  }
   if (kind == "shear") {
     const bool by_rate = s.number("stage.strain_rate") != 0;
     s.expect(by_rate != (s.number("stage.velocity") != 0), by_rate ? "stage.strain_rate" : "stage.velocity",
@@ -329,7 +333,8 @@ bool Case::has_water() const {
 }
 
 bool Case::presses() const {
-  return std::any_of(stages.begin(), stages.end(), [](const Stage& s) { return s.kind == Stage::Kind::press; });
+  return std::any_of(stages.begin(), stages.end(),
+                     [](const Stage& s) { return s.kind == Stage::Kind::press; });
 }
 
 Case load(const fs::path& directory, const std::vector<Override>& overrides) {

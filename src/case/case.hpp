@@ -70,11 +70,12 @@ struct Stage {
   TopWall top_wall;      // automatic: none for settle and press, prescribed for uniaxial, else stress
   double normal_stress;  // Pa
   double normal_stress_amplitude, normal_stress_frequency, normal_stress_phase;  // Pa, Hz, rad
-  double velocity;      // m/s, of the top layer; 0 where strain_rate is given
-  double strain_rate;   // 1/s; times the bed height gives the velocity (shear), axial (uniaxial), of each side (press)
+  double velocity;     // m/s, of the top layer; 0 where strain_rate is given
+  double strain_rate;  // 1/s; times the bed height gives the velocity (shear), axial (uniaxial), of each side
+                       // (press)
   double shear_stress;  // Pa, for shear_stress
-  double porosity;      // 1, that a press ends with; 0 where pressure is given
-  double pressure;      // Pa, on all sides of a pressed box; 0 where porosity is given
+  double porosity;      // 1, that a press or a uniaxial stage ends with; 0 where something else ends it
+  double pressure;      // Pa, of a press, on all sides of the box; 0 where porosity is given
   double layer_mass;    // kg, that the shear stress moves besides the grains of the layer
   double bottom_layer, top_layer;  // m, thickness by grain centres; negative: one largest diameter
   bool hold_layer_height;

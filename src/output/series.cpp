@@ -46,7 +46,8 @@ const std::vector<Column>& columns() {
       {"normal_stress", "Pa",
        "force of the grains on the top wall (the floor, where there is none) over the cross-section"},
       {"shear_friction", "1", "shear stress over normal stress"},
-      {"height", "m", "height of the bed: the top wall, the highest point of any grain, or a box periodic in z"},
+      {"height", "m",
+       "height of the bed: the top wall, the highest point of any grain, or a box periodic in z"},
       {"dilation", "m", "height gained since the stage began"},
       {"dilation_diameters", "1", "height gained since the stage began, in mean grain diameters"},
       {"porosity", "1", "share of the bed that is not grains"},
@@ -113,9 +114,9 @@ Series::Series(const std::filesystem::path& path, const std::vector<Row>& rows, 
     std::filesystem::remove(aside, cause);
     throw;
   }
-  impl_ = std::make_unique<Impl>(Impl{hdf5::File::open(path, H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE), wanted, {}, rows});
-  for (const std::size_t c : wanted)
-    impl_->datasets.push_back(impl_->file.open_dataset(columns()[c].name));
+  impl_ = std::make_unique<Impl>(
+      Impl{hdf5::File::open(path, H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE), wanted, {}, rows});
+  for (const std::size_t c : wanted) impl_->datasets.push_back(impl_->file.open_dataset(columns()[c].name));
 }
 
 // After a failed append the file is left as a kill would leave it, readable: closing it would declare it

@@ -12,7 +12,6 @@
 #include "run/estimate.hpp"
 #include "run/needs.hpp"
 #include "run/precheck.hpp"
-#include "run/press.hpp"
 #include "run/progress.hpp"
 #include "run/run.hpp"
 #include "run/schedule.hpp"
@@ -118,8 +117,8 @@ void check_case(const Options& options) {
     // Before the bed has settled its height is not known: from the volume of the grains.
     const double height = c.start.empty() ? settled : stage.height_0;
     double strain_rate = wanted.strain_rate != 0 ? wanted.strain_rate : layer_velocity(scene) / height;
-    const double duration = presses(stage)         ? stage.duration
-                            : wanted.duration > 0 ? wanted.duration
+    const double duration = wanted.duration > 0   ? wanted.duration
+                            : wanted.porosity > 0 ? stage.duration
                                                   : wanted.strain / std::abs(strain_rate);
     const double steps = std::max(1.0, std::round(duration / scene.dt));
     Estimate::Time time{steps, std::numeric_limits<double>::quiet_NaN()};

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "dem/body/motion.hpp"
-#include "dem/deform.hpp"
 #include "dem/grain.hpp"
 #include "dem/scene_check.hpp"
 #include "error.hpp"
@@ -112,8 +111,9 @@ void Guard::check(const dem::State& s) {
         "; expected at most guards.max_overlap = ", limits_.max_overlap,
         stage_.porosity > 0
             ? text(": ", stage_.name, " has pressed the grains to a porosity of ",
-                   1 - dem::solid_volume(s) / dem::box_volume(stage_.scene), ", on the way to ", stage_.porosity,
-                   ", which these grains may not reach (equal spheres come to 0.36 without friction); expected "
+                   dem::observe(stage_.scene, s).porosity, ", on the way to ", stage_.porosity,
+                   ", which these grains may not reach (equal spheres come to 0.36 without friction); "
+                   "expected "
                    "a larger porosity, less friction, or a smaller strain_rate")
             : ": the load or the impact is too much for contact.k_n, or the step is too long (try a smaller "
               "model.f)");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dem/scene_check.hpp"
 #include "error.hpp"
 
 namespace moraine::run {
@@ -35,6 +36,12 @@ dem::Vec3d to_pressure(const Stage& stage, const dem::State& s, double ahead) {
   return factor;
 }
 
+void expect_looser(const std::string& stage, double now, double porosity) {
+  if (!(porosity < now))
+    throw error("stage ", stage, ": porosity = ", porosity, ", where the grains have ", now,
+                " already; expected less than that (to press does not loosen)");
+}
+
 }  // namespace
 
 bool presses(const Stage& stage) { return stage.kind == cases::Stage::Kind::press; }
@@ -42,11 +49,22 @@ bool presses(const Stage& stage) { return stage.kind == cases::Stage::Kind::pres
 double pressing_time(const std::string& stage, const dem::Scene& scene, const dem::State& s, double porosity,
                      double strain_rate) {
   const double solid = dem::solid_volume(s), volume = dem::box_volume(scene);
-  const double now = 1 - solid / volume;
-  if (!(porosity < now))
-    throw error("stage ", stage, ": porosity = ", porosity, ", where the box has ", now,
-                " already; expected less than that (a press does not loosen)");
+  expect_looser(stage, 1 - solid / volume, porosity);
+  dem::Scene pressed = scene;
+  pressed.box = std::cbrt(solid / (1 - porosity) / volume) * scene.box;
+  try {
+    dem::check_scene(pressed, s);
+  } catch (const Error& why) {
+    throw error("stage ", stage, ": at porosity = ", porosity, ", ", why.what(), ": more grains would do");
+  }
   return std::log(volume * (1 - porosity) / solid) / (3 * strain_rate);
+}
+
+double squeezing_time(const std::string& stage, const dem::Scene& scene, const dem::State& s, double height_0,
+                      double porosity, double strain_rate) {
+  const double solid = dem::solid_volume(s) / scene.area();  // m
+  expect_looser(stage, 1 - solid / s.wall_z(), porosity);
+  return (s.wall_z() - solid / (1 - porosity)) / (strain_rate * height_0);
 }
 
 dem::Vec3d next_press(const Stage& stage, const dem::State& s) {

@@ -174,7 +174,8 @@ class Runner {
                    std::to_string(start_.before.state.size()) + " grains, " + engine_->describe());
     for (const std::string& c : changes_) progress_->say("changed: " + c);
     for (const std::string& w : warnings_) progress_->say("warning: " + w);
-    series_ = std::make_unique<output::Series>(files_.series(), now_.rows, case_.has_water(), case_.presses());
+    series_ =
+        std::make_unique<output::Series>(files_.series(), now_.rows, case_.has_water(), case_.presses());
 
     for (auto k = static_cast<std::size_t>(now_.stage); k < case_.stages.size(); ++k)
       run_stage(k, resuming), resuming = false;

@@ -192,8 +192,10 @@ Start start_of(const cases::Case& c) {
   p.seed = g.seed, p.columns_x = g.columns_x, p.columns_y = g.columns_y, p.cell = g.cell;
   p.box_x = c.box_x, p.box_y = c.box_y, p.box_z = c.box_z;
   dem::LooseGrains loose = dem::make_loose_grains(p);
-  Start s{{},          loose.box_x,
-          loose.box_y, loose.box_z > 0 ? loose.box_z : c.box_z,
+  Start s{{},
+          loose.box_x,
+          loose.box_y,
+          loose.box_z > 0 ? loose.box_z : c.box_z,
           default_wall_mass(c, loose.state.size(), loose.cell)};
   s.before.state = std::move(loose.state);
   return s;
@@ -267,6 +269,8 @@ double nominal_rate(const cases::Stage& stage, const output::Checkpoint& now) { 
 }
 
 double duration_of(const cases::Stage& stage, const output::Checkpoint& now) {  // s
+  if (stage.porosity > 0 && stage.kind == Kind::uniaxial)
+    return squeezing_time(stage.name, now.scene, now.state, now.height_0, stage.porosity, stage.strain_rate);
   if (stage.porosity > 0)
     return pressing_time(stage.name, now.scene, now.state, stage.porosity, stage.strain_rate);
   return stage.duration > 0 ? stage.duration : stage.strain / std::abs(nominal_rate(stage, now));

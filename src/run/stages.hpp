@@ -36,7 +36,7 @@ struct Stage {
   double height_0;                            // m, H_0 of strain and dilation
   double diameter;                            // m, mean of the grains
   double strain_rate;                         // 1/s, nominal: u/H_0, axial, or of each side
-  double porosity, pressure;                  // 1, Pa: what a press is after; the other one is 0
+  double porosity, pressure;                  // 1, Pa: what the grains are pressed to; 0: not
   std::vector<std::string> warnings;
 
   double time(std::int64_t step) const { return scene.time(step) - first_time; }  // s, since it began
