@@ -143,14 +143,14 @@ void check_case(const Options& options) {
                              : "");
     if (c.automatic_dt)
       std::printf("    dt = auto   %.3g of the critical step, as the contacts come and go\n", c.safety);
-    if (wanted.normal_stress > 0) {
+    const double pressure = std::max(wanted.normal_stress, wanted.pressure);
+    if (pressure > 0) {
       const double r = 0.5 * diameter;
       std::printf(
-          "    stiffness   k_n/(sigma_0 d) = %.3g%s\n", c.contact.k_n / (wanted.normal_stress * diameter),
-          c.contact.k_n / (wanted.normal_stress * diameter) < 1e4 ? "  (below 1e4: softer than rigid grains)"
-                                                                  : "");
+          "    stiffness   k_n/(sigma_0 d) = %.3g%s\n", c.contact.k_n / (pressure * diameter),
+          c.contact.k_n / (pressure * diameter) < 1e4 ? "  (below 1e4: softer than rigid grains)" : "");
       if (strain_rate != 0) {
-        const double inertia = std::abs(strain_rate) * r * std::sqrt(c.grains.density / wanted.normal_stress);
+        const double inertia = std::abs(strain_rate) * r * std::sqrt(c.grains.density / pressure);
         std::printf("    inertia     I = %.3g (eq. 1)%s\n", inertia,
                     inertia > 1e-3 ? "  (above 1e-3: not pseudo-static)" : "");
       }
