@@ -11,11 +11,15 @@ from .case import MissingData
 window = 300  # s of the clock over which the pace of a run is measured
 
 
-def duration(stage, height):
-    """Of a stage, s of model time; `height`: H_0 of the bed, that when shear began, m. As describe() in src/run/stages.cpp."""
+def duration(stage, height, porosity=None):
+    """Of a stage, s of model time; `height`: H_0 of the bed, that when shear began, m; `porosity`: when the stage began. As
+    duration_of() in src/run/stages.cpp."""
     s = stage.settings
     if s["duration"] > 0:
         return s["duration"]
+    if s.get("porosity", 0) > 0:
+        shrunk = (1 - porosity) / (1 - s["porosity"])  # volume at the end over that of the start
+        return (1 - shrunk if stage.kind == "uniaxial" else -np.log(shrunk) / 3) / s["strain_rate"]
     return s["strain"] / abs(s["velocity"] / height if s["velocity"] else s["strain_rate"])
 
 
@@ -103,7 +107,7 @@ class Progress:
 
     @property
     def duration(self):
-        return duration(self.stage, self.height_0)
+        return duration(self.stage, self.height_0, self.own["porosity"][0])
 
     @property
     def fraction(self):
@@ -129,12 +133,14 @@ class Progress:
         since = time.time() - self._seen[-1][0]
         stage = max(0.0, (self.duration - self.last("stage_time")) / rate - since)
         later, goes_on = 0.0, self.stage.sheared
+        porosity = self.stage.settings.get("porosity") or self.last("porosity")
         for other in self.case.stages[self.stage.index + 1:]:
             goes_on = goes_on and other.sheared
             height = self.height_0 if goes_on else self.last("height")
             # The time step of a stage, hence how fast it advances, goes with its f, unless the case gives dt.
             faster = 1 if self.case.settings["model"]["dt"] else other.settings["f"] / self.stage.settings["f"]
-            later += duration(other, height) / (rate * faster)
+            later += duration(other, height, porosity) / (rate * faster)
+            porosity = other.settings.get("porosity") or porosity
         return stage, stage + later
 
     def residue(self):

@@ -109,7 +109,10 @@ void check_case(const Entries& entries) {
     c.expect(periodic == "none" || periodic.find(axis) == string::npos, "box.walls", "none along ", axis,
              ", which is periodic (box.periodic = \"", periodic, "\")");
   if (c.text("box.periodic").find('z') != string::npos) {
-    c.expect(c.number("box.z") > 0, "box.z", "> 0 m where z is periodic");
+    const string start = c.text("start");
+    const bool of_start = !start.empty() && !start.ends_with(".csv");
+    const bool by_fraction = start.empty() && c.text("grains.placement") == "random";
+    c.expect(c.number("box.z") > 0 || of_start || by_fraction, "box.z", "> 0 m where z is periodic");
     c.expect(!c.flag("box.floor"), "box.floor", "false where z is periodic");
   }
 }
@@ -142,6 +145,18 @@ void check_water(const Reader& s, const Reader& above, bool no_wall) {
            "false with model.dt = \"auto\": water and grains meet every so many equal steps");
 }
 
+// Of a stage that presses.
+void check_press(const Reader& s, const Reader& above) {
+  const bool to_porosity = s.number("stage.porosity") > 0;
+  above.expect(above.text("box.periodic") == "xyz", "box.periodic", "xyz: stage ", s.text("stage.name"),
+               " presses all sides of the box");
+  above.expect(above.number("model.gravity") == 0, "model.gravity", "0 m/s2: stage ", s.text("stage.name"),
+               " presses grains that nothing holds up");
+  s.expect(to_porosity != (s.number("stage.pressure") > 0), to_porosity ? "stage.pressure" : "stage.porosity",
+           "either porosity or pressure");
+  s.expect(s.number("stage.strain_rate") > 0, "stage.strain_rate", "> 0 1/s");
+}
+
 void check_stage(const Entries& entries, const Entries& above, const Context& context) {
   const Reader s(entries);
   const string kind = context.kind;
@@ -155,8 +170,15 @@ void check_stage(const Entries& entries, const Entries& above, const Context& co
   }
 
   const bool by_strain = s.number("stage.strain") != 0;
-  s.expect(by_strain != (s.number("stage.duration") != 0), by_strain ? "stage.strain" : "stage.duration",
-           kind == "shear" || kind == "uniaxial" ? "either duration or strain" : "a duration > 0 s");
+  if (kind == "press") check_press(s, Reader(above));
+  if (s.number("stage.porosity") > 0) {
+    for (const char* key : {"stage.duration", "stage.strain"})
+      s.expect(s.number(key) == 0, key, "0: porosity and strain_rate say when the stage ends");
+    s.expect(s.number("stage.strain_rate") > 0, "stage.strain_rate", "> 0 1/s, towards a lower porosity");
+  } else {
+    s.expect(by_strain != (s.number("stage.duration") != 0), by_strain ? "stage.strain" : "stage.duration",
+             kind == "shear" || kind == "uniaxial" ? "either duration or strain" : "a duration > 0 s");
+  }
   if (kind == "shear") {
     const bool by_rate = s.number("stage.strain_rate") != 0;
     s.expect(by_rate != (s.number("stage.velocity") != 0), by_rate ? "stage.strain_rate" : "stage.velocity",
@@ -175,7 +197,8 @@ void check_stage(const Entries& entries, const Entries& above, const Context& co
   if (kind == "uniaxial")
     s.expect(wall == "automatic", "stage.top_wall",
              "automatic: strain_rate drives the wall of a uniaxial stage");
-  const bool by_stress = wall == "stress" || (wall == "automatic" && kind != "settle" && kind != "uniaxial");
+  const bool no_wall = wall == "none" || (wall == "automatic" && (kind == "settle" || kind == "press"));
+  const bool by_stress = wall == "stress" || (wall == "automatic" && !no_wall && kind != "uniaxial");
   const double normal_stress = s.number("stage.normal_stress");
   const double amplitude = s.number("stage.normal_stress_amplitude");
   if (by_stress) {
@@ -191,10 +214,9 @@ void check_stage(const Entries& entries, const Entries& above, const Context& co
     s.expect(s.number("stage.normal_stress_frequency") > 0, "stage.normal_stress_frequency",
              "> 0 Hz with an amplitude");
   if (Reader(above).text("box.periodic").find('z') != string::npos)
-    s.expect(wall == "none" || (wall == "automatic" && kind == "settle"), "stage.top_wall",
-             "none where z is periodic");
+    s.expect(no_wall, "stage.top_wall", "none where z is periodic");
 
-  check_water(s, Reader(above), wall == "none" || (wall == "automatic" && kind == "settle"));
+  check_water(s, Reader(above), no_wall);
   s.expect(s.number("stage.mu_d") <= s.number("stage.mu_s"), "stage.mu_d",
            "at most mu_s = ", s.number("stage.mu_s"));
 }
@@ -317,6 +339,11 @@ Case load_checked(const fs::path& directory, const std::vector<Override>& overri
 
 bool Case::has_water() const {
   return std::any_of(stages.begin(), stages.end(), [](const Stage& s) { return s.fluid; });
+}
+
+bool Case::presses() const {
+  return std::any_of(stages.begin(), stages.end(),
+                     [](const Stage& s) { return s.kind == Stage::Kind::press; });
 }
 
 Case load(const fs::path& directory, const std::vector<Override>& overrides) {

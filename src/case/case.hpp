@@ -63,18 +63,21 @@ struct Fluid {
 struct Stage {
   enum class FluidTop { drained, impermeable };
   enum class FluidBottom { no_flow, pressure, flux };
-  enum class Kind { settle, consolidate, shear, shear_stress, uniaxial };
+  enum class Kind { settle, consolidate, shear, shear_stress, uniaxial, press };
   enum class TopWall { automatic, stress, fixed, none };
   std::string name;
   Kind kind;
   double duration;       // s; 0 where `strain` is given
   double strain;         // shear strain u t/H_0, or axial strain for uniaxial; 0 where `duration` is given
-  TopWall top_wall;      // automatic: none for settle, prescribed for uniaxial, else stress
+  TopWall top_wall;      // automatic: none for settle and press, prescribed for uniaxial, else stress
   double normal_stress;  // Pa
   double normal_stress_amplitude, normal_stress_frequency, normal_stress_phase;  // Pa, Hz, rad
-  double velocity;      // m/s, of the top layer; 0 where strain_rate is given
-  double strain_rate;   // 1/s; times the bed height gives the velocity (shear), or axial rate (uniaxial)
+  double velocity;     // m/s, of the top layer; 0 where strain_rate is given
+  double strain_rate;  // 1/s; times the bed height gives the velocity (shear), axial (uniaxial), of each side
+                       // (press)
   double shear_stress;  // Pa, for shear_stress
+  double porosity;      // 1, that a press or a uniaxial stage ends with; 0 where something else ends it
+  double pressure;      // Pa, of a press, on all sides of the box; 0 where porosity is given
   double layer_mass;    // kg, that the shear stress moves besides the grains of the layer
   double bottom_layer, top_layer;  // m, thickness by grain centres; negative: one largest diameter
   bool hold_layer_height;
@@ -138,6 +141,7 @@ struct Case {
   Guards guards;
 
   bool has_water() const;  // in any stage
+  bool presses() const;    // in any stage
   std::string resolved;    // the merged case.toml, SI numbers, ready to be written and read again
   bool operator==(const Case&) const = default;
 };

@@ -20,7 +20,8 @@ constexpr double apart = 1e-6;   // of both radii, between grains at random plac
 // of sizes; grains are no larger than those before, so that no class holds smaller ones.
 class RandomPlaces {
  public:
-  RandomPlaces(Vec3d box, bool periodic_x, bool periodic_y) : box_(box), periodic_{periodic_x, periodic_y} {}
+  RandomPlaces(Vec3d box, bool periodic_x, bool periodic_y, bool periodic_z)
+      : box_(box), periodic_{periodic_x, periodic_y, periodic_z} {}
 
   // False where no place was found.
   bool put(double r, Random& random) {
@@ -28,7 +29,7 @@ class RandomPlaces {
     for (int attempt = 0; attempt < attempts; ++attempt) {
       Vec3d x;
       for (int a = 0; a < 3; ++a) {
-        const double away = a < 2 && periodic_[a] ? 0 : margin * r;
+        const double away = periodic_[a] ? 0 : margin * r;
         x[a] = away + (box_[a] - 2 * away) * random.uniform();
       }
       if (!is_free(x, r)) continue;
@@ -41,7 +42,7 @@ class RandomPlaces {
   std::vector<Vec3d> places() && { return std::move(x_); }
 
  private:
-  static constexpr int attempts = 2000;
+  static constexpr int attempts = 20000;
   struct Class {
     Class(const Vec3d& box, double r) : largest(r) {
       for (int a = 0; a < 3; ++a) {
@@ -68,7 +69,7 @@ class RandomPlaces {
       Index low[3], high[3];
       for (int a = 0; a < 3; ++a) {
         low[a] = c.along(a, x[a] - reach), high[a] = c.along(a, x[a] + reach);
-        if (a == 2 || !periodic_[a]) {
+        if (!periodic_[a]) {
           low[a] = std::max<Index>(low[a], 0), high[a] = std::min(high[a], c.n[a] - 1);
         } else if (high[a] - low[a] + 1 >= c.n[a]) {
           low[a] = 0, high[a] = c.n[a] - 1;
@@ -77,9 +78,9 @@ class RandomPlaces {
       for (Index k = low[2]; k <= high[2]; ++k)
         for (Index j = low[1]; j <= high[1]; ++j)
           for (Index i = low[0]; i <= high[0]; ++i)
-            for (const Index g : c.cells[c.index((i + c.n[0]) % c.n[0], (j + c.n[1]) % c.n[1], k)]) {
+            for (const Index g : c.cells[c.index((i + c.n[0]) % c.n[0], (j + c.n[1]) % c.n[1], (k + c.n[2]) % c.n[2])]) {
               Vec3d d = x - x_[g];
-              for (int a = 0; a < 2; ++a)
+              for (int a = 0; a < 3; ++a)
                 if (periodic_[a]) d[a] -= box_[a] * std::round(d[a] / box_[a]);
               const double least = (r + r_[g]) * (1 + apart);
               if (dot(d, d) < least * least) return false;
@@ -89,7 +90,7 @@ class RandomPlaces {
   }
 
   Vec3d box_;
-  bool periodic_[2];
+  bool periodic_[3];
   std::vector<Class> classes_;
   std::vector<Vec3d> x_;
   std::vector<double> r_;
@@ -134,21 +135,41 @@ void expect_box(const Packing& p) {
         "grains at random places (grains.placement) need a box; expected box.x and box.y of more than 0 m");
 }
 
+// The box of this volume whose sides are equal where `box` has 0; `box` itself where it has none.
+Vec3d with_sides(Vec3d box, double volume) {
+  int open = 0;
+  for (int a = 0; a < 3; ++a)
+    if (box[a] > 0)
+      volume /= box[a];
+    else
+      ++open;
+  const double side = open == 3 ? std::cbrt(volume) : open == 2 ? std::sqrt(volume) : volume;
+  for (int a = 0; a < 3; ++a)
+    if (!(box[a] > 0)) box[a] = side;
+  return box;
+}
+
 LooseGrains at_random_places(const Packing& p, std::vector<double> r, Random& random) {
-  expect_box(p);
+  if (!p.periodic_z) expect_box(p);
   std::sort(r.begin(), r.end(), std::greater<>());
   double solid = 0;
   for (const double radius : r) solid += sphere_volume(radius);
   const double most = 2 * margin * r[0];
-  for (const double side : {p.box_x, p.box_y})
+  Vec3d box{p.box_x, p.box_y, p.box_z};
+  const double loose = solid / p.solid_fraction;  // m3
+  if (p.periodic_z)
+    box = with_sides(box, loose);
+  else
+    box.z = std::max(loose / (p.box_x * p.box_y), most);
+  for (const double side : {box.x, box.y, box.z})
     if (side < most)
       throw error("the largest grain, of ", 2 * r[0], " m, does not fit into a box ", side, " m wide");
-  const double height = std::max(solid / (p.solid_fraction * p.box_x * p.box_y), most);
-  RandomPlaces places({p.box_x, p.box_y, height}, p.periodic_x, p.periodic_y);
+  RandomPlaces places(box, p.periodic_x, p.periodic_y, p.periodic_z);
   for (std::size_t i = 0; i < r.size(); ++i)
     if (!places.put(r[i], random))
       throw error("no place was found for grain ", i + 1, " of ", r.size(), ", ", 2 * r[i],
-                  " m wide, at grains.solid_fraction = ", p.solid_fraction, "; expected a smaller one");
+                  " m wide, where they fill ", solid / (box.x * box.y * box.z),
+                  " of the space; expected a smaller grains.solid_fraction, or a larger box");
   const double cell = p.cell * 2 * mean_volume_radius(r);
   // Ids in no order of size.
   std::vector<Vec3d> x = std::move(places).places();
@@ -156,7 +177,7 @@ LooseGrains at_random_places(const Packing& p, std::vector<double> r, Random& ra
     const auto j = static_cast<std::size_t>(random.uniform() * static_cast<double>(i + 1));
     std::swap(r[i], r[j]), std::swap(x[i], x[j]);
   }
-  return {grains_at_rest(std::move(r), std::move(x)), p.box_x, p.box_y, cell};
+  return {grains_at_rest(std::move(r), std::move(x)), box.x, box.y, p.periodic_z ? box.z : 0, cell};
 }
 
 }  // namespace

@@ -23,17 +23,21 @@ struct Packing {
   std::int64_t columns_x = 10, columns_y = 10;  // lattice
   double cell = 2.1;                            // lattice: height of a cell in largest diameters
   double solid_fraction = 0.25;                 // random: of the box up to the height that they fill
-  double box_x = 0, box_y = 0;                  // m; 0: columns times the height of a cell
-  bool periodic_x = true, periodic_y = true;
+  double box_x = 0, box_y = 0;                  // m; 0: columns times the height of a cell, or see below
+  double box_z = 0;                             // m; counts only where z is periodic
+  bool periodic_x = true, periodic_y = true, periodic_z = false;
 };
 
 struct LooseGrains {
   State state;          // at rest
   double box_x, box_y;  // m
+  double box_z = 0;     // m; of Packing where z is periodic at random places, else 0
   double cell;          // m, of the lattice; random: as wide as that of grains of the mean volume
 };
 
 // The same grains for the same numbers, wherever it runs. Throws Error where the grains do not fit.
+// At random places with z periodic the sides that are 0 are equal, and such that solid_fraction holds; where
+// none is 0 the box says how loose the grains are.
 LooseGrains make_loose_grains(const Packing& packing);
 
 // A state of n grains at rest, all arrays of the right length.

@@ -39,6 +39,7 @@ struct Scene {
   MORAINE_HD const Body& body(BodyId id) const { return bodies[static_cast<int>(id)]; }
   MORAINE_HD Body& body(BodyId id) { return bodies[static_cast<int>(id)]; }
   bool has(BodyId id) const { return body(id).is_there(); }
+  bool is_periodic() const { return periodic_x && periodic_y && periodic_z; }  // in all directions
   bool has_planes() const {
     for (const BodyId id : planes)
       if (has(id)) return true;

@@ -51,16 +51,21 @@ struct Row {
   double water_drained_top, water_drained_bottom;                      // m3
   double water_volume, water_balance;                                  // m3
   double water_work, water_stored, water_dissipated;                   // J
+  // Of a box that is pressed; columns only where a stage of the case presses.
+  double side_x, side_y, side_z;        // m
+  double stress_x, stress_y, stress_z;  // Pa, of the grains on its sides
 };
-const std::vector<Column>& columns();    // as many as Row has doubles, in its order
-constexpr std::size_t dry_columns = 27;  // of these, the first
+const std::vector<Column>& columns();     // as many as Row has doubles, in its order
+constexpr std::size_t dry_columns = 27;   // of these, the first
+constexpr std::size_t side_columns = 39;  // from here those of a pressed box; in between those of water
 
 // series.h5: one extendible chunked dataset of doubles for each column, each with attributes `units` and
 // `meaning`.
 class Series {
  public:
   // Creates PATH anew holding `rows` (written aside and renamed), then opens it for appending in SWMR mode.
-  Series(const std::filesystem::path& path, const std::vector<Row>& rows, bool with_water = false);
+  Series(const std::filesystem::path& path, const std::vector<Row>& rows, bool with_water = false,
+         bool with_sides = false);
   ~Series();
   void append(const Row& row);  // flushed: a reader sees it at once
   const std::vector<Row>& rows() const;

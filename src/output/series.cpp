@@ -16,11 +16,12 @@ constexpr hsize_t chunk = 256;  // rows
 
 using Numbers = std::array<double, sizeof(Row) / sizeof(double)>;
 
-void create(const std::filesystem::path& path, const std::vector<Row>& rows, std::size_t count) {
+void create(const std::filesystem::path& path, const std::vector<Row>& rows,
+            const std::vector<std::size_t>& wanted) {
   const auto file = hdf5::File::create(path);
   file.set("program", std::string("moraine"));
   std::vector<double> numbers(rows.size());
-  for (std::size_t c = 0; c < count; ++c) {
+  for (const std::size_t c : wanted) {
     const auto& [name, units, meaning] = columns()[c];
     std::transform(rows.begin(), rows.end(), numbers.begin(),
                    [c](const Row& row) { return std::bit_cast<Numbers>(row)[c]; });
@@ -45,7 +46,8 @@ const std::vector<Column>& columns() {
       {"normal_stress", "Pa",
        "force of the grains on the top wall (the floor, where there is none) over the cross-section"},
       {"shear_friction", "1", "shear stress over normal stress"},
-      {"height", "m", "height of the bed: the top wall, or the highest point of any grain"},
+      {"height", "m",
+       "height of the bed: the top wall, the highest point of any grain, or a box periodic in z"},
       {"dilation", "m", "height gained since the stage began"},
       {"dilation_diameters", "1", "height gained since the stage began, in mean grain diameters"},
       {"porosity", "1", "share of the bed that is not grains"},
@@ -61,7 +63,8 @@ const std::vector<Column>& columns() {
       {"wall_kinetic", "J", "kinetic energy of the top wall, and of layer_mass"},
       {"slip", "J", "dissipated by sliding friction since the stage began"},
       {"viscous", "J", "dissipated by contact viscosity since the stage began"},
-      {"top_wall_work", "J", "work of the load on the top wall since the stage began"},
+      {"top_wall_work", "J",
+       "work of the load on the top wall, or of the sides of a pressed box, since the stage began"},
       {"layers_work", "J", "work of the driven layers since the stage began"},
       {"residue", "J", "energy that the balance leaves unexplained since the stage began"},
       {"wall_water_pressure", "Pa", "pressure of the water on the top wall, over hydrostatic"},
@@ -77,33 +80,43 @@ const std::vector<Column>& columns() {
       {"water_work", "J", "work of the water on grains and wall since the stage began"},
       {"water_stored", "J", "energy of the compressed water"},
       {"water_dissipated", "J", "dissipated by the flow of the water since the stage began"},
+      {"side_x", "m", "side of the box along x"},
+      {"side_y", "m", "side of the box along y"},
+      {"side_z", "m", "side of the box along z"},
+      {"stress_x", "Pa", "stress of the contacts along x, positive in compression"},
+      {"stress_y", "Pa", "stress of the contacts along y"},
+      {"stress_z", "Pa", "stress of the contacts along z"},
   };
   return list;
 }
 
 struct Series::Impl {
   hdf5::File file;
+  std::vector<std::size_t> wanted;  // columns
   std::vector<hdf5::Handle> datasets;
   std::vector<Row> rows;
   bool failed = false;
 };
 
-Series::Series(const std::filesystem::path& path, const std::vector<Row>& rows, bool with_water) {
-  const std::size_t count = with_water ? columns().size() : dry_columns;
+Series::Series(const std::filesystem::path& path, const std::vector<Row>& rows, bool with_water,
+               bool with_sides) {
+  std::vector<std::size_t> wanted;
+  for (std::size_t c = 0; c < columns().size(); ++c)
+    if (c < dry_columns || (c < side_columns ? with_water : with_sides)) wanted.push_back(c);
   const hdf5::Lock lock;
   const std::filesystem::path aside = path.string() + ".tmp";
   std::error_code cause;
   try {
-    create(aside, rows, count);
+    create(aside, rows, wanted);
     std::filesystem::rename(aside, path, cause);
     if (cause) throw error(path.string(), ": cannot replace the file: ", cause.message());
   } catch (const Error&) {
     std::filesystem::remove(aside, cause);
     throw;
   }
-  impl_ = std::make_unique<Impl>(Impl{hdf5::File::open(path, H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE), {}, rows});
-  for (std::size_t c = 0; c < count; ++c)
-    impl_->datasets.push_back(impl_->file.open_dataset(columns()[c].name));
+  impl_ = std::make_unique<Impl>(
+      Impl{hdf5::File::open(path, H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE), wanted, {}, rows});
+  for (const std::size_t c : wanted) impl_->datasets.push_back(impl_->file.open_dataset(columns()[c].name));
 }
 
 // After a failed append the file is left as a kill would leave it, readable: closing it would declare it
@@ -120,17 +133,18 @@ Series::~Series() {
 
 void Series::append(const Row& row) {
   const hdf5::Lock lock;
-  auto& [file, datasets, rows, failed] = *impl_;
+  auto& [file, wanted, datasets, rows, failed] = *impl_;
   const auto numbers = std::bit_cast<Numbers>(row);
   const hsize_t start = rows.size(), one = 1, grown = start + 1;
   const hdf5::Handle memory(H5Screate(H5S_SCALAR), H5Sclose);
   failed = true;  // unless it gets to the end
-  for (std::size_t c = 0; c < datasets.size(); ++c) {
+  for (std::size_t k = 0; k < datasets.size(); ++k) {
+    const std::size_t c = wanted[k];
     const char* name = columns()[c].name;
-    file.check(H5Dset_extent(datasets[c], &grown), name, "grow");
-    const hdf5::Handle space(file.check(H5Dget_space(datasets[c]), name, "grow"), H5Sclose);
+    file.check(H5Dset_extent(datasets[k], &grown), name, "grow");
+    const hdf5::Handle space(file.check(H5Dget_space(datasets[k]), name, "grow"), H5Sclose);
     H5Sselect_hyperslab(space, H5S_SELECT_SET, &start, nullptr, &one, nullptr);
-    file.check(H5Dwrite(datasets[c], H5T_NATIVE_DOUBLE, memory, space, H5P_DEFAULT, &numbers[c]), name,
+    file.check(H5Dwrite(datasets[k], H5T_NATIVE_DOUBLE, memory, space, H5P_DEFAULT, &numbers[c]), name,
                "write");
   }
   file.flush();
@@ -146,7 +160,8 @@ std::vector<Row> read_series(const std::filesystem::path& path) {
   std::array<std::vector<double>, std::tuple_size_v<Numbers>> numbers;
   std::size_t rows = SIZE_MAX;
   for (std::size_t c = 0; c < numbers.size(); ++c) {
-    if (c == dry_columns && !file.holds(columns()[c].name)) break;
+    const bool may_lack = c >= dry_columns;
+    if (may_lack && !file.holds(columns()[c].name)) continue;
     file.read(columns()[c].name, numbers[c]);
     rows = std::min(rows, numbers[c].size());  // the last row may be on its way
   }

@@ -146,7 +146,9 @@ void check_case(const Options& options) {
     // Before the bed has settled its height is not known: from the volume of the grains.
     const double height = c.start.empty() ? settled : stage.height_0;
     double strain_rate = wanted.strain_rate != 0 ? wanted.strain_rate : layer_velocity(scene) / height;
-    const double duration = wanted.duration > 0 ? wanted.duration : wanted.strain / std::abs(strain_rate);
+    const double duration = wanted.duration > 0   ? wanted.duration
+                            : wanted.porosity > 0 ? stage.duration
+                                                  : wanted.strain / std::abs(strain_rate);
     const double steps = std::max(1.0, std::round(duration / scene.dt));
     Estimate::Time time{steps, std::numeric_limits<double>::quiet_NaN()};
     std::string unknown;
@@ -170,14 +172,14 @@ void check_case(const Options& options) {
                              : "");
     if (c.automatic_dt)
       std::printf("    dt = auto   %.3g of the critical step, as the contacts come and go\n", c.safety);
-    if (wanted.normal_stress > 0) {
+    const double pressure = std::max(wanted.normal_stress, wanted.pressure);
+    if (pressure > 0) {
       const double r = 0.5 * diameter;
       std::printf(
-          "    stiffness   k_n/(sigma_0 d) = %.3g%s\n", c.contact.k_n / (wanted.normal_stress * diameter),
-          c.contact.k_n / (wanted.normal_stress * diameter) < 1e4 ? "  (below 1e4: softer than rigid grains)"
-                                                                  : "");
+          "    stiffness   k_n/(sigma_0 d) = %.3g%s\n", c.contact.k_n / (pressure * diameter),
+          c.contact.k_n / (pressure * diameter) < 1e4 ? "  (below 1e4: softer than rigid grains)" : "");
       if (strain_rate != 0) {
-        const double inertia = std::abs(strain_rate) * r * std::sqrt(inertial_density / wanted.normal_stress);
+        const double inertia = std::abs(strain_rate) * r * std::sqrt(inertial_density / pressure);
         std::printf("    inertia     I = %.3g (eq. 1)%s\n", inertia,
                     inertia > 1e-3 ? "  (above 1e-3: not pseudo-static)" : "");
       }

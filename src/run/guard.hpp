@@ -21,7 +21,7 @@ namespace moraine::run {
 
 class Guard {
  public:
-  // `rows`: the series so far, with at least the first row of this stage.
+  // `rows`: the series so far, with at least the first row of this stage. Stage and start have to outlive it.
   Guard(const cases::Guards& limits, const Stage& stage, const std::vector<output::Row>& rows,
         const output::StageStart& start);
 
@@ -34,10 +34,10 @@ class Guard {
   void check_energy(const dem::State& state);
 
   cases::Guards limits_;
-  const Stage& stage_;  // whose step may change meanwhile
-  output::Row first_;   // of the stage
-  output::StageStart start_;
-  double most_put_in_ = 0;  // J
+  const Stage& stage_;               // whose step may change meanwhile
+  output::Row first_;                // of the stage
+  const output::StageStart& start_;  // a press moves what rows count from
+  double most_put_in_ = 0;           // J
 };
 
 // The deepest overlap of a state's contacts, as a fraction of the smaller radius.

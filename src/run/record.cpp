@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <limits>
 
+#include "dem/deform.hpp"
+
 namespace moraine::run {
 
 namespace {
@@ -51,6 +53,11 @@ output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, c
   row.water_work = l.water - l_0.water;
   row.slip = l.slip - l_0.slip, row.viscous = l.viscous - l_0.viscous;
   row.top_wall_work = l.planes - l_0.planes, row.layers_work = l.layers - l_0.layers;
+  if (stage.scene.is_periodic()) {
+    const dem::BoxStress box = dem::box_stress(stage.scene, s);
+    row.side_x = stage.scene.box.x, row.side_y = stage.scene.box.y, row.side_z = stage.scene.box.z;
+    row.stress_x = box.normal.x, row.stress_y = box.normal.y, row.stress_z = box.normal.z;
+  }
   row.residue = stage.scene.ledger ? (e.total() - start.energy) + row.slip + row.viscous - row.top_wall_work -
                                          row.layers_work - row.water_work
                                    : std::numeric_limits<double>::quiet_NaN();

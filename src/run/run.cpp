@@ -15,6 +15,7 @@
 #include "output/sealed.hpp"
 #include "run/guard.hpp"
 #include "run/precheck.hpp"
+#include "run/press.hpp"
 #include "run/progress.hpp"
 #include "run/record.hpp"
 #include "run/schedule.hpp"
@@ -174,7 +175,8 @@ class Runner {
     if (!resuming && !start_.note.empty()) progress_->say(start_.note);
     for (const std::string& c : changes_) progress_->say("changed: " + c);
     for (const std::string& w : warnings_) progress_->say("warning: " + w);
-    series_ = std::make_unique<output::Series>(files_.series(), now_.rows, case_.has_water());
+    series_ =
+        std::make_unique<output::Series>(files_.series(), now_.rows, case_.has_water(), case_.presses());
 
     for (auto k = static_cast<std::size_t>(now_.stage); k < case_.stages.size(); ++k)
       run_stage(k, resuming), resuming = false;
@@ -203,6 +205,7 @@ class Runner {
       loads_ = dem::loads_of(stage.scene, now_.state);
       record(stage);
       snapshot(stage);
+      if (presses(stage) && now_.state.step % steps_between_presses == 0) press(stage);
       if (case_.automatic_dt && stage.goes_on) follow_bed(stage);  // as after any record
       if (index == 0) save();
     }
@@ -226,6 +229,8 @@ class Runner {
       std::int64_t until = std::min({event.step, look, step + slice});
       const std::int64_t estimate = now_.critical_at + steps_between_estimates;
       if (case_.automatic_dt) until = std::min(until, estimate);
+      const std::int64_t jump = (step / steps_between_presses + 1) * steps_between_presses;
+      if (presses(stage)) until = std::min(until, jump);
       until = at_exchange(stage, until);
       const auto began = Clock::now();
       const bool due = until == event.step;
@@ -240,6 +245,7 @@ class Runner {
         if (event.snapshot) snapshot(stage);
       }
       if (Clock::now() >= next_list_) list_snapshots();
+      if (presses(stage) && !ended && step == jump) press(stage);
       if (case_.automatic_dt && !ended && (due || step == estimate)) follow_bed(stage);
       const std::int64_t done = step - stage.first_step;
       if (options_.on_progress) options_.on_progress(index, done, std::max<std::int64_t>(done, steps));
@@ -281,6 +287,30 @@ class Runner {
     fit_step(stage, now_.state, case_.safety * now_.critical_step);
     engine_->load(stage.scene, now_.state);
     now_.scene = stage.scene;
+  }
+
+  // The sides jump. Their work is what the springs then hold more, and slip what these let go at once; what
+  // rows count from moves by that, as the engine's ledger begins anew.
+  void press(Stage& stage) {
+    take_state();
+    dem::State& s = now_.state;
+    const dem::Vec3d factor = next_press(stage, s);
+    const dem::Ledger before = s.ledger;
+    const double kinetic = dem::kinetic_energy(stage.scene, s);
+    const dem::SpringEnergy springs = dem::spring_energy(stage.scene, s);
+    dem::deform(stage.scene, s, factor);
+    const double carried = dem::spring_energy(stage.scene, s).tangential;
+    engine_->load(stage.scene, s);
+    take_state();
+    now_.scene = stage.scene;
+    const dem::SpringEnergy after = dem::spring_energy(stage.scene, s);
+    const double slip = carried - after.tangential;
+    const double work = after.normal + carried - springs.normal - springs.tangential +
+                        dem::kinetic_energy(stage.scene, s) - kinetic;
+    dem::Ledger& from = now_.start.ledger;
+    from.slip += s.ledger.slip - before.slip - slip;
+    from.viscous += s.ledger.viscous - before.viscous;
+    from.planes += s.ledger.planes - before.planes - work;
   }
 
   // With pore water the last interval between exchanges step by step, for the mean loads over it. Same bits

@@ -12,6 +12,7 @@
 #include "output/sealed.hpp"
 #include "run/needs.hpp"
 #include "run/own_grains.hpp"
+#include "run/press.hpp"
 #include "run/schedule.hpp"
 
 namespace moraine::run {
@@ -30,7 +31,8 @@ dem::Body top_wall_of(const cases::Case& c, const cases::Stage& stage, const Sta
   using Wanted = cases::Stage::TopWall;
   const bool automatic = stage.top_wall == Wanted::automatic;
   const bool given = stage.top_wall == Wanted::fixed || (automatic && stage.kind == Kind::uniaxial);
-  const bool stress = stage.top_wall == Wanted::stress || (automatic && stage.kind != Kind::settle);
+  const bool none = stage.kind == Kind::settle || stage.kind == Kind::press;
+  const bool stress = stage.top_wall == Wanted::stress || (automatic && !none);
   if (!given && !stress) return {};
   dem::Body wall = dem::top_wall();
   wall.mass = c.wall_mass > 0 ? c.wall_mass : start.wall_mass;
@@ -46,9 +48,10 @@ dem::Body top_wall_of(const cases::Case& c, const cases::Stage& stage, const Sta
 }
 
 // All but the time step. height: m, H_0.
-dem::Scene scene_of(const cases::Case& c, const cases::Stage& stage, const Start& start, double height) {
+dem::Scene scene_of(const cases::Case& c, const cases::Stage& stage, const Start& start,
+                    const dem::Vec3d& box, double height) {
   dem::Scene scene;
-  scene.box = {start.box_x, start.box_y, start.box_z};
+  scene.box = box;
   scene.periodic_x = c.periodic_x, scene.periodic_y = c.periodic_y, scene.periodic_z = c.periodic_z;
   scene.gravity = c.gravity, scene.density = c.grains.density;
   scene.least_inertia = c.density_scaling;
@@ -88,6 +91,16 @@ output::Checkpoint read_start(const std::filesystem::path& path) {
         "; expected an undamaged copy, or run the case it comes from again: --resume does that from its "
         "checkpoint before");
   }
+}
+
+// A press has changed the sides that the case was given.
+void expect_same_box(const cases::Case& c, const dem::Scene& scene) {
+  const dem::Vec3d given{c.box_x, c.box_y, c.box_z};
+  if (!scene.is_periodic() || !c.periodic_z) return;
+  for (int a = 0; a < 3; ++a)
+    if (given[a] > 0 && std::abs(given[a] - scene.box[a]) > 1e-9 * scene.box[a])
+      throw error(c.start.string(), ": its grains fill a box of ", scene.box[a], " m along ", "xyz"[a],
+                  ", not of box.", "xyz"[a], " = ", given[a], " m; expected 0, to take that of `start`");
 }
 
 }  // namespace
@@ -153,6 +166,7 @@ Start start_of(const cases::Case& c) {
     s.before.rows.clear(), s.before.snapshots.clear();
     s.before.stage = 0, s.before.start.time = 0, s.before.finished = false;
     const dem::Scene& scene = s.before.scene;
+    expect_same_box(c, scene);
     if (s.box_x <= 0) s.box_x = scene.box.x;
     if (s.box_y <= 0) s.box_y = scene.box.y;
     if (s.box_z <= 0) s.box_z = scene.box.z;
@@ -174,15 +188,20 @@ Start start_of(const cases::Case& c) {
   if (g.distribution == "fractal") p.ranges = {{g.radius_min, g.radius_max, g.fractal_dimension, 1}};
   if (g.distribution == "sieves") p.ranges = dem::ranges_of(sieves_in(g.sieves));
   if (g.placement == "random") p.placement = dem::Packing::Placement::random;
-  p.solid_fraction = g.solid_fraction, p.periodic_x = c.periodic_x, p.periodic_y = c.periodic_y;
+  p.solid_fraction = g.solid_fraction;
+  p.periodic_x = c.periodic_x, p.periodic_y = c.periodic_y, p.periodic_z = c.periodic_z;
   p.radius_mean = g.radius_mean, p.radius_std = g.radius_std;
   p.fine_radius_mean = g.fine_radius_mean, p.fine_radius_std = g.fine_radius_std;
   p.fine_fraction = g.fine_fraction;
   p.radius_min = g.radius_min, p.radius_max = g.radius_max;
   p.seed = g.seed, p.columns_x = g.columns_x, p.columns_y = g.columns_y, p.cell = g.cell;
-  p.box_x = c.box_x, p.box_y = c.box_y;
+  p.box_x = c.box_x, p.box_y = c.box_y, p.box_z = c.box_z;
   dem::LooseGrains loose = dem::make_loose_grains(p);
-  Start s{{}, loose.box_x, loose.box_y, c.box_z, default_wall_mass(c, loose.state.size(), loose.cell)};
+  Start s{{},
+          loose.box_x,
+          loose.box_y,
+          loose.box_z > 0 ? loose.box_z : c.box_z,
+          default_wall_mass(c, loose.state.size(), loose.cell)};
   s.before.state = std::move(loose.state);
   return s;
 }
@@ -235,12 +254,12 @@ coupling::Water water_of(const cases::Case& c, const cases::Stage& stage, const 
 }
 
 // Whether the stage asks for just what drives the grains already.
-bool goes_on(const cases::Case& c, const cases::Stage& stage, const Start& start,
+bool goes_on(const cases::Case& c, const cases::Stage& stage, const Start& start, const dem::Vec3d& box,
              const output::Checkpoint& now) {
   if (!now.state.staggered || stage.zero_kinematics || stage.clear_history) return false;
   if (c.automatic_dt && !(now.critical_step > 0)) return false;  // dt did not follow the bed so far
   const dem::Scene& before = now.scene;
-  dem::Scene scene = scene_of(c, stage, start, now.height_0);
+  dem::Scene scene = scene_of(c, stage, start, box, now.height_0);
   scene.dt = c.automatic_dt ? before.dt : step_of(c, stage, scene, now.state);
   scene.time_0 = before.time_0, scene.step_0 = before.step_0;
   scene.exchange_interval = before.exchange_interval;
@@ -254,8 +273,12 @@ double nominal_rate(const cases::Stage& stage, const output::Checkpoint& now) { 
   return shears(stage.kind) ? layer_velocity(now.scene) / now.height_0 : stage.strain_rate;
 }
 
-double duration_of(const cases::Stage& stage, double strain_rate) {  // s
-  return stage.duration > 0 ? stage.duration : stage.strain / std::abs(strain_rate);
+double duration_of(const cases::Stage& stage, const output::Checkpoint& now) {  // s
+  if (stage.porosity > 0 && stage.kind == Kind::uniaxial)
+    return squeezing_time(stage.name, now.scene, now.state, now.height_0, stage.porosity, stage.strain_rate);
+  if (stage.porosity > 0)
+    return pressing_time(stage.name, now.scene, now.state, stage.porosity, stage.strain_rate);
+  return stage.duration > 0 ? stage.duration : stage.strain / std::abs(nominal_rate(stage, now));
 }
 
 // Of a stage that shears on with the layers of the one before.
@@ -285,7 +308,7 @@ void forget(const cases::Stage& stage, dem::State& s) {
 // Which grains are part of layers, and what displacement, strain and dilation are counted from; returns
 // warnings.
 std::vector<std::string> set_reference(const cases::Case& c, std::size_t index, const Start& start,
-                                       output::Checkpoint& now) {
+                                       double box_z, output::Checkpoint& now) {
   const cases::Stage& stage = c.stages[index];
   dem::State& s = now.state;
   std::vector<std::string> warnings;
@@ -297,7 +320,8 @@ std::vector<std::string> set_reference(const cases::Case& c, std::size_t index, 
     s.at(BodyId::bottom_layer) = s.at(BodyId::top_layer) = {};
   }
   s.x_start = s.x;
-  now.height_0 = s.wall_z() > 0 ? s.wall_z() : bed_top(s);
+  const bool whole_box = c.periodic_z && !shears(stage.kind);
+  now.height_0 = whole_box ? box_z : s.wall_z() > 0 ? s.wall_z() : bed_top(s);
   return warnings;
 }
 
@@ -325,7 +349,8 @@ Stage describe(const cases::Case& c, std::size_t index, const output::Checkpoint
   out.first_step = now.start.step, out.first_time = now.start.clock, out.end = now.start.end;
   out.diameter = mean_diameter(now.state);
   out.strain_rate = nominal_rate(stage, now);
-  out.duration = duration_of(stage, out.strain_rate);
+  out.duration = out.end - out.first_time;
+  out.porosity = stage.porosity, out.pressure = stage.pressure;
   out.series_interval = c.output.series_interval, out.snapshot_interval = c.output.snapshot_interval;
   return out;
 }
@@ -333,10 +358,12 @@ Stage describe(const cases::Case& c, std::size_t index, const output::Checkpoint
 Stage prepare(const cases::Case& c, std::size_t index, const Start& start, output::Checkpoint& now) {
   const cases::Stage& stage = c.stages.at(index);
   dem::State& s = now.state;
-  if (goes_on(c, stage, start, now)) {
+  // A press has changed it.
+  const dem::Vec3d box = index == 0 ? dem::Vec3d{start.box_x, start.box_y, start.box_z} : now.scene.box;
+  if (goes_on(c, stage, start, box, now)) {
     now.scene.neighbour_margin = c.neighbour_margin;
     now.start.step = s.step, now.start.clock = now.scene.time(s.step);
-    now.start.end += duration_of(stage, nominal_rate(stage, now));
+    now.start.end += duration_of(stage, now);
     now.water_settings.solver = coupling::Solver(int(c.fluid.solver));
     now.water_settings.tolerance = c.fluid.tolerance;
     Stage out = describe(c, index, now);
@@ -351,17 +378,17 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, outpu
     s.at(BodyId::top_wall) = {};
   else if (s.wall_z() <= 0)
     s.wall_z() = bed_top(s);  // lowered onto the highest grain
-  const std::vector<std::string> warnings = set_reference(c, index, start, now);
+  const std::vector<std::string> warnings = set_reference(c, index, start, box.z, now);
   s.step = 0, s.staggered = false, s.ledger = {};
   s.water_force.clear(), s.water = {};
-  dem::Scene scene = scene_of(c, stage, start, now.height_0);
+  dem::Scene scene = scene_of(c, stage, start, box, now.height_0);
   dem::sort_spatially(scene, s);
   scene.dt = c.automatic_dt ? c.safety * critical_step(scene, s) : step_of(c, stage, scene, s);
   now.scene = scene;
   now.water_settings = water_of(c, stage, scene, now.height_0, s);
   now.critical_step = 0, now.critical_at = 0;
   now.start = {};
-  now.start.end = duration_of(stage, nominal_rate(stage, now));
+  now.start.end = duration_of(stage, now);
   Stage out = describe(c, index, now);
   out.goes_on = false, out.warnings = warnings;
   if (c.automatic_dt) fit_step(out, s, scene.dt), now.scene = out.scene;
@@ -371,6 +398,7 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, outpu
 output::Checkpoint foreseen(const cases::Case& c, std::size_t index, const Start& start) {
   output::Checkpoint now = start.before;
   if (index == 0) return now;
+  now.scene.box = {start.box_x, start.box_y, start.box_z};
   if (shears(c.stages.at(index).kind) && shears(c.stages[index - 1].kind)) {
     now = foreseen(c, index - 1, start);
     prepare(c, index - 1, start, now);  // for the layers that it will keep

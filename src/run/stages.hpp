@@ -17,7 +17,7 @@ namespace moraine::run {
 struct Start {
   output::Checkpoint
       before;  // the grains, and how an earlier case has left them (scene.dt = 0: there was none)
-  double box_x, box_y, box_z;        // m
+  double box_x, box_y, box_z;        // m, of the first stage; the later ones have what it leaves
   double wall_mass;                  // kg
   std::vector<dem::BodyId> roles{};  // by id: the layers of stages that shear; empty: by height
   std::string note{};                // for the log, about the grains
@@ -37,7 +37,8 @@ struct Stage {
   double series_interval, snapshot_interval;  // s
   double height_0;                            // m, H_0 of strain and dilation
   double diameter;                            // m, mean of the grains
-  double strain_rate;                         // 1/s, nominal: u/H_0, or axial
+  double strain_rate;                         // 1/s, nominal: u/H_0, axial, or of each side
+  double porosity, pressure;                  // 1, Pa: what the grains are pressed to; 0: not
   std::vector<std::string> warnings;
 
   double time(std::int64_t step) const { return scene.time(step) - first_time; }  // s, since it began

@@ -33,7 +33,8 @@ namespace {
 double expected_work(const cases::Case& c, std::size_t stage) {
   const cases::Stage& s = c.stages[stage];
   const double rate = std::abs(s.strain_rate != 0 ? s.strain_rate : s.velocity);
-  const double duration = s.duration > 0 ? s.duration : s.strain / rate;
+  // A press is taken to shorten the sides by a fifth.
+  const double duration = s.duration > 0 ? s.duration : (s.porosity > 0 ? 0.2 : s.strain) / rate;
   return duration / (c.dt > 0 ? c.dt : s.f) * static_cast<double>(c.grains.count);
 }
 

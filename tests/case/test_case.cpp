@@ -492,7 +492,7 @@ TEST_F(CaseTest, stages_are_named_once_and_well) {
       "x/case.toml:6: stage.name = \"settle\": there is another stage of this name; expected a unique one");
   EXPECT_EQ(fault_of("[[stage]]\nname = \"a\"\n"),
             "x/case.toml:1: stage.a.kind is missing; expected settle | consolidate | shear | shear_stress | "
-            "uniaxial");
+            "uniaxial | press");
 }
 
 TEST_F(CaseTest, relations_between_keys) {

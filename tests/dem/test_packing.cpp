@@ -126,6 +126,38 @@ TEST(Packing, RandomPlacesAreFree) {
   }
 }
 
+// With z periodic the sides that are not given follow from the space that grains are to fill.
+TEST(Packing, RandomPlacesInAPeriodicBox) {
+  Packing p;
+  p.count = 1500, p.placement = Packing::Placement::random, p.periodic_z = true;
+  p.distribution = Packing::Distribution::ranges, p.ranges = {{0.002, 0.02, 2.6, 1}};
+  for (const double given : {0.0, 0.11}) {
+    p.box_y = given;
+    const LooseGrains l = make_loose_grains(p);
+    const Vec3d side{l.box_x, l.box_y, l.box_z};
+    EXPECT_EQ(side.x, side.z);
+    EXPECT_EQ(side.y, given > 0 ? given : side.x);
+    double volume = 0;
+    bool across = false;
+    for (Index i = 0; i < l.state.size(); ++i) {
+      const Vec3d& x = l.state.x[i];
+      const double r = l.state.r[i];
+      volume += sphere_volume(r);
+      across = across || x.z < r;
+      for (Index j = 0; j < i; ++j) {
+        Vec3d d = x - l.state.x[j];
+        for (int a = 0; a < 3; ++a) d[a] -= side[a] * std::round(d[a] / side[a]);
+        ASSERT_GT(dot(d, d), std::pow(r + l.state.r[j], 2)) << i << ' ' << j;
+      }
+    }
+    EXPECT_TRUE(across);
+    EXPECT_NEAR(volume / (side.x * side.y * side.z), 0.25, 1e-12);
+  }
+  p.box_x = p.box_z = 0.2;  // a box that is given says how loose the grains are
+  const LooseGrains l = make_loose_grains(p);
+  EXPECT_EQ(l.box_z, 0.2);
+}
+
 TEST(Packing, RandomPlacesMayRunOut) {
   Packing p;
   p.count = 2000, p.placement = Packing::Placement::random, p.solid_fraction = 0.6;

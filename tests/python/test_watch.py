@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -284,3 +285,9 @@ def test_misspelt_options_name_the_nearest(capsys):
                         (["watch", "CASE", "more"], "more: one word too many for watch; see moraine watch --help")]:
         assert main(words) == 1
         assert capsys.readouterr().err == f"moraine: {said}\n"
+
+
+@pytest.mark.parametrize("kind, expected", [("press", np.log(0.6 / 0.25) / 3 / 0.5), ("uniaxial", (1 - 0.25 / 0.6) / 0.5)])
+def test_porosity_ends_a_stage(kind, expected):
+    pressed = SimpleNamespace(kind=kind, settings=stage("s", kind, porosity=0.4, strain_rate=0.5))
+    assert progress.duration(pressed, 0.3, 0.75) == pytest.approx(expected)
