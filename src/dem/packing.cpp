@@ -138,7 +138,9 @@ LooseGrains at_random_places(const Packing& p, std::vector<double> r, Random& ra
   const double most = 2 * margin * r[0];
   for (const double side : {p.box_x, p.box_y})
     if (side < most)
-      throw error("the largest grain, of ", 2 * r[0], " m, does not fit into a box ", side, " m wide");
+      throw error(
+          "the largest grain, ", 2 * r[0], " m wide, does not fit into a box ", side,
+          " m wide; expected a wider box (box.x, box.y), or smaller sizes (those without a unit are in m)");
   const double height = std::max(solid / (p.solid_fraction * p.box_x * p.box_y), most);
   RandomPlaces places({p.box_x, p.box_y, height}, p.periodic_x, p.periodic_y);
   for (std::size_t i = 0; i < r.size(); ++i)

@@ -125,11 +125,10 @@ static std::vector<dem::Sieve> sieves_in(const std::filesystem::path& file) {
   const std::vector<double> size = table.column("size", "m"), finer = table.column("finer", "1");
   std::vector<dem::Sieve> sieves;
   for (std::size_t k = 0; k < size.size(); ++k) sieves.push_back({size[k], finer[k]});
-  try {
-    dem::ranges_of(sieves);
-  } catch (const Error& why) {
-    throw error(file.string(), ": ", why.what());
-  }
+  if (sieves.size() < 2)
+    throw error(file.string(), ": has ", sieves.size(),
+                " sieve; expected two or more, from 0 to 100 % finer");
+  dem::ranges_of(sieves, [&](std::size_t k) { return table.at(k); });
   return sieves;
 }
 
