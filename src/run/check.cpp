@@ -36,7 +36,8 @@ void print_water(const cases::Case& c, const Stage& stage, const dem::State& s,
   for (const double r : s.r) volume += dem::sphere_volume(r);
   const double phi =
       std::clamp(1 - volume / (stage.scene.area() * height), w.porosity_range[0], w.porosity_range[1]);
-  const double k = w.k_c * phi * phi * phi / ((1 - phi) * (1 - phi));
+  const double sauter = sauter_diameter(s), k_c = w.k_c > 0 ? w.k_c : sauter * sauter / 180,
+               k = k_c * phi * phi * phi / ((1 - phi) * (1 - phi));
   const double m = modulus(c, s, 1 - phi, stage.diameter), storage = phi * w.compressibility;
   const double d = k / (w.viscosity * storage), c_v = k / (w.viscosity * (1 / m + storage));
   const coupling::Stability stability = water.stability();
@@ -49,9 +50,12 @@ void print_water(const cases::Case& c, const Stage& stage, const dem::State& s,
               stage.scene.box.x / w.cells[0] / stage.diameter, h / stage.diameter, largest / stage.diameter);
   std::printf("    exchange    every %.4g s; stable up to %.4g s (contacts %.3g rad/s, water %.3g rad/s)\n",
               interval, stability.longest_dt, stability.w_sk, stability.w_f);
-  if (c.fluid.permeability_factor == 0)
-    std::printf("    k_c         %.3g m2 = d^2/180 with the Sauter mean diameter d = %.4g m\n", w.k_c,
-                sauter_diameter(s));
+  if (w.k_c == 0)
+    std::printf(
+        "    k_c         %.3g m2 = d^2/180 with the Sauter mean diameter d = %.4g m; in each cell that of "
+        "its "
+        "grains\n",
+        k_c, sauter);
   std::printf(
       "    water       k = %.3g m2 at porosity %.3g; D = k/(mu phi beta) = %.3g m2/s; diffusion number "
       "%.3g\n",

@@ -196,9 +196,9 @@ coupling::Water water_of(const cases::Case& c, const cases::Stage& stage, const 
   w.present = stage.fluid;
   if (!w.present) return w;
   const cases::Fluid& f = c.fluid;
-  const double diameter = mean_diameter(s), sauter = sauter_diameter(s);
+  const double diameter = mean_diameter(s);
   w.viscosity = f.viscosity, w.compressibility = f.compressibility;
-  w.k_c = f.permeability_factor > 0 ? f.permeability_factor : sauter * sauter / 180;
+  w.k_c = f.permeability_factor;
   w.porosity_range = {f.porosity_min, f.porosity_max};
   w.height = f.height > 0 ? f.height : height + f.cell * diameter;
   const bool wall = scene.has(BodyId::top_wall);

@@ -263,10 +263,12 @@ inline double largest_difference(const std::vector<double>& a, const std::vector
 }
 
 // What the grains gain the water loses, under either top. also(state, sum of |force|): what else must hold.
+// cells: others than those of water_over().
 template <class Also>
-void expect_momentum_kept(const WetBed& bed, Also&& also) {
+void expect_momentum_kept(const WetBed& bed, Also&& also, const std::array<int, 3>& cells = {}) {
   for (const TopSide top : {TopSide::drained, TopSide::impermeable}) {
     Water w = water_under(bed, top);
+    if (cells[0] > 0) w.cells = cells;
     if (top == TopSide::drained) w.sides.high[2].value = 3e3;
     WetRun run(bed, w);
     run.advance(3000);
