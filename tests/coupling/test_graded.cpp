@@ -176,15 +176,6 @@ TEST(Graded, DragIsSharedByVolume) {
   }
 }
 
-WetBed pressed_graded() {
-  const dem::Bed& settled = dem::graded_bed();
-  WetBed bed{settled.scene, settled.state};
-  bed.scene.body(dem::BodyId::top_wall) = dem::wall_pressed_by(500, 0.5);
-  bed.state.wall_z() = bed_top(bed.state);
-  for (dem::Index i = 0; i < bed.state.size(); ++i) bed.state.v[i] = {2 * bed.state.x[i].z, 0.1, 0};
-  return bed;
-}
-
 TEST(Graded, GrainsGainTheMomentumThatWaterLoses) {
   expect_momentum_kept(pressed_graded(), [](const State&, double) {}, {3, 3, 2});
 }

@@ -169,6 +169,16 @@ inline const WetBed& heavy_bed() {  // settled, without a wall
   return bed;
 }
 
+// Sizes 1:20 under a light wall, sheared and drifting.
+inline WetBed pressed_graded() {
+  const dem::Bed& settled = dem::graded_bed();
+  WetBed bed{settled.scene, settled.state};
+  bed.scene.body(dem::BodyId::top_wall) = dem::wall_pressed_by(500, 0.5);
+  bed.state.wall_z() = bed_top(bed.state);
+  for (dem::Index i = 0; i < bed.state.size(); ++i) bed.state.v[i] = {2 * bed.state.x[i].z, 0.1, 0};
+  return bed;
+}
+
 // Real water in cells some 2.5 diameters wide; drained at the top.
 inline Water water_over(const WetBed& bed, double height = 0) {
   Water w;
