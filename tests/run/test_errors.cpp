@@ -268,12 +268,18 @@ TEST_F(Errors, StartFiles) {
   directory.write("text.h5", "no HDF5 file");
   expect_error(words("../text.h5"), {"text.h5", "not a checkpoint of moraine"});
 
-  const fs::path bed = make("bed", "stages = [\"settle\"]\n" + small_case());
-  run(bed, {"stage.settle.duration=0.01"});
-  const std::string whole = contents(checkpoint_of(bed));
-  for (const std::size_t size : {whole.size() / 2, whole.size() - 1}) {
-    directory.write("cut.h5", whole.substr(0, size));
-    expect_error(words("../cut.h5"), {"cut.h5", "truncated"});
+  for (const std::string& text : {graded_case(), small_case()}) {
+    const fs::path bed = make("bed", "stages = [\"settle\"]\n" + text);
+    run(bed, {"stage.settle.duration=0.01"}, {"--force"});
+    const std::string whole = contents(checkpoint_of(bed));
+    for (const std::size_t size : {whole.size() / 2, whole.size() - 1}) {
+      directory.write("cut.h5", whole.substr(0, size));
+      expect_error(words("../cut.h5"), {"cut.h5", "truncated"});
+    }
+    std::string flipped = whole;  // one bit in what it holds
+    flipped[whole.size() / 2] ^= 1;
+    directory.write("flipped.h5", flipped);
+    expect_error(words("../flipped.h5"), {"flipped.h5"});
   }
   expect_error(words("../bed/output/series.h5"), {"series.h5", "not a checkpoint of moraine"});
   EXPECT_FALSE(fs::exists(small / "output"));
