@@ -47,7 +47,7 @@ struct Fluid {
   double viscosity;                        // Pa s
   double compressibility;                  // 1/Pa
   double density;                          // kg/m3
-  double permeability_factor;              // m2, k_c; 0: d^2/180, Sauter mean
+  double permeability_factor;              // m2, k_c; 0: d^2/180, local Sauter mean
   double porosity_min, porosity_max;       // 1, kept within for permeability and storage
   double cell;                             // mean diameters
   std::int64_t cells_x, cells_y, cells_z;  // 0: by `cell`

@@ -78,7 +78,8 @@ CsvTable::CsvTable(const std::filesystem::path& file, const std::vector<string>&
     lines_.push_back(number);
   }
   if (columns_.empty())
-    throw error(file.string(), ": is empty; expected a line of names, such as x, y, z, r");
+    throw error(file.string(),
+                ": is empty; expected a line of names, one for each column, and numbers below");
   if (lines_.empty()) throw error(file.string(), ": has no rows below the names of its columns");
 }
 

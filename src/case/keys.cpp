@@ -175,7 +175,7 @@ std::vector<Key> make_keys() {
       row<fluid, &F::viscosity>("fluid.viscosity", "Pa s", "1.8e-3", "> 0", "of the water"),
       row<fluid, &F::compressibility>("fluid.compressibility", "1/Pa", "4.5e-10", "> 0", "of the water"),
       row<fluid, &F::density>("fluid.density", "kg/m3", "1000", "> 0", "of the water, for buoyancy"),
-      row<fluid, &F::permeability_factor>("fluid.permeability_factor", "m2", "0", ">= 0", "k_c of k = k_c phi^3/(1 - phi)^2; 0: d^2/180, d the Sauter mean diameter (sum of d^3 over sum of d^2)"),
+      row<fluid, &F::permeability_factor>("fluid.permeability_factor", "m2", "0", ">= 0", "k_c of k = k_c phi^3/(1 - phi)^2; 0: d^2/180, d the Sauter mean diameter (sum of d^3 over sum of d^2) of the grains in each cell"),
       row<fluid, &F::porosity_min>("fluid.porosity_min", "1", "0.1", "> 0", "storage and permeability take no lower porosity"),
       row<fluid, &F::porosity_max>("fluid.porosity_max", "1", "0.9", "> 0", "nor a higher one"),
       row<fluid, &F::cell>("fluid.cell", "1", "2.5", "> 0", "side of a grid cell in mean diameters, at least; below 2 it measures pores"),

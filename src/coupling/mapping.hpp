@@ -86,6 +86,9 @@ class Mapping {
     return psi_;
   }  // 1, about each face; psi_min at least where grains are
   const std::vector<double>& porosity() const { return phi_; }  // of each cell, exactly
+  // m, Sauter mean diameter of what of the grains is in each cell: 6 volume over surface, where a grain's
+  // surface goes with its volume. 0 where there are none.
+  const std::vector<double>& sauter() const { return sauter_; }
   const Outside& outside() const { return outside_; }
 
  private:
@@ -166,7 +169,7 @@ class Mapping {
   BallParts ball_;
   Outside outside_;
   Faces layer_, psi_, scale_;
-  std::vector<double> phi_;
+  std::vector<double> phi_, sauter_;
 };
 
 }  // namespace moraine::coupling

@@ -45,7 +45,7 @@ void Mapping::cut(const fluid::Grid& grid, const Holds& holds, const dem::GrainR
   fluid::Grid eighths = grid;
   for (int& cells : eighths.n) cells *= 2;
   const double widest = wide_from * std::min({grid.h(0), grid.h(1), grid.h(2)});
-  std::vector<double> solid(grid.cells(), 0);  // m3
+  std::vector<double> solid(grid.cells(), 0), over_r(grid.cells(), 0);  // m3; m2, volumes over radii
   const auto cell = [&](int i, int j, int k) {
     std::array<int, 3> c{i, j, k};
     for (int a = 0; a < 3; ++a) c[a] = (c[a] % grid.n[a] + grid.n[a]) % grid.n[a];
@@ -58,20 +58,27 @@ void Mapping::cut(const fluid::Grid& grid, const Holds& holds, const dem::GrainR
     if (r <= widest) {
       volume_[i] = inside;
       ball_.cut(grid, holds, x[i], r);
-      ball_.each([&](int a, int b, int c, double v) { solid[cell(a, b, c)] += v; });
+      ball_.each([&](int a, int b, int c, double v) {
+        const std::size_t at = cell(a, b, c);
+        solid[at] += v, over_r[at] += v / r;
+      });
       continue;
     }
     volume_[i] = 0;
     const std::size_t first = parts_.size();
     ball_.cut(eighths, holds, x[i], r);
     ball_.each([&](int a, int b, int c, double v) {
-      solid[cell(a >> 1, b >> 1, c >> 1)] += v;
+      const std::size_t at = cell(a >> 1, b >> 1, c >> 1);
+      solid[at] += v, over_r[at] += v / r;
       parts_.push_back({{(a + 0.5) * eighths.h(0), (b + 0.5) * eighths.h(1), (c + 0.5) * eighths.h(2)}, v});
     });
     if (parts_.size() > first) wide_.push_back({i, first, parts_.size()});
   }
-  phi_.resize(grid.cells());
-  for (std::size_t c = 0; c < grid.cells(); ++c) phi_[c] = 1 - solid[c] / grid.cell_volume();
+  phi_.resize(grid.cells()), sauter_.resize(grid.cells());
+  for (std::size_t c = 0; c < grid.cells(); ++c) {
+    phi_[c] = 1 - solid[c] / grid.cell_volume();
+    sauter_[c] = over_r[c] > 0 ? 2 * solid[c] / over_r[c] : 0;
+  }
 }
 
 // m3, of a grain inside. What is not is booked with the side that it lies beyond, along x first.

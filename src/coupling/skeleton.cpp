@@ -40,10 +40,13 @@ fluid::Sides sides_of(const Water& water) {
 Skeleton::Skeleton(const Water& water, const dem::Scene& scene, const dem::State& grains,
                    const fluid::Grid& grid)
     : water_(water), scene_(scene), grid_(grid), grains_(dem::grain_rows(scene, grains)) {
+  double over_r = 0;
   for (dem::Index i = 0; i < grains.size(); ++i) {
     volume_.push_back(dem::sphere_volume(grains.r[i])), solids_ += volume_.back();
+    over_r += volume_.back() / grains.r[i];
     top_layer_.push_back(in_top_layer(grains, i));
   }
+  sauter_ = 2 * solids_ / over_r;
   const fluid::Sides sides = sides_of(water);
   for (int a = 0; a < 3; ++a) {
     sides_.open_low[a] = sides.low[a].kind != fluid::Side::Kind::closed;
@@ -61,12 +64,23 @@ void Skeleton::make(const std::vector<Vec3d>& x, double height) {
   for (std::size_t c = 0; c < grid_.cells(); ++c) {
     double& phi = medium_.porosity[c];
     phi = std::clamp(phi, water_.porosity_range[0], water_.porosity_range[1]);
-    medium_.permeability[c] = kozeny_carman(water_.k_c, phi);
+    medium_.permeability[c] = kozeny_carman(k_c(c), phi);
   }
   for (int a = 0; a < 3; ++a)
     for (const bool high : {false, true})
       if (sides_.holds.at(a, high))
         medium_.gap[a][high] = wall_gap(grid_, grains_.data(), x, water_.porosity_range, a, high);
+}
+
+double Skeleton::k_c(std::size_t cell) const {
+  if (water_.k_c > 0) return water_.k_c;
+  const double of_all = sauter_ * sauter_ / 180, d = mapping_.sauter()[cell],
+               least = water_.porosity_range[0];
+  if (d == 0) return of_all;
+  const double here = d * d / 180, phi = mapping_.porosity()[cell];
+  if (phi >= least || here <= of_all) return here;
+  const double share = std::max(phi, 0.0) / least;
+  return of_all + (here - of_all) * share * share * share;
 }
 
 double Skeleton::longest_way(const std::vector<Vec3d>& x, const dem::GrainRow* now) const {

@@ -1,5 +1,10 @@
 // The grains as the water meets them: weights (mapping.hpp), porosity, permeability (Kozeny-Carman) and the
 // gaps at the walls, all made anew from where grains are.
+//
+// Where the water states no k_c it is d^2/180 in each cell, d the Sauter mean diameter of the grains there;
+// of all grains in a cell that has none. In a cell that a large grain fills the porosity that counts is
+// porosity_range's least, which with so large a d would make it more permeable than what is around it: d^2
+// falls towards that of all grains as (phi/phi_min)^3.
 #pragma once
 #include <vector>
 
@@ -39,6 +44,7 @@ class Skeleton {
   double longest_way(const std::vector<dem::Vec3d>& x, const dem::GrainRow* now) const;
 
  private:
+  double k_c(std::size_t cell) const;
   bool beyond(const dem::Vec3d& x, double r) const;
   std::vector<double> squeeze(const std::vector<dem::Vec3d>& x);
 
@@ -48,7 +54,7 @@ class Skeleton {
   SidesOf sides_;
   std::vector<dem::GrainRow> grains_;  // where they were at make()
   std::vector<double> volume_;
-  double solids_ = 0;
+  double solids_ = 0, sauter_ = 0;  // sauter: m, mean diameter
   std::vector<bool> top_layer_;
   dem::TouchingPairs touching_;
   Mapping mapping_;

@@ -24,9 +24,9 @@ enum class Solver { automatic, pcg, cholmod };
 // Constant while a stage runs.
 struct Water {
   bool present = false;
-  double viscosity = 1.8e-3;                       // Pa s, mu_f
-  double compressibility = 4.5e-10;                // 1/Pa, beta
-  double k_c = 0;                                  // m2, of k = k_c phi^3/(1 - phi)^2
+  double viscosity = 1.8e-3;         // Pa s, mu_f
+  double compressibility = 4.5e-10;  // 1/Pa, beta
+  double k_c = 0;  // m2, of k = k_c phi^3/(1 - phi)^2; 0: by the grains of each cell (skeleton.hpp)
   std::array<double, 2> porosity_range{0.1, 0.9};  // phi is kept within it for k and storage
   std::array<int, 3> cells{1, 1, 1};
   double height = 0;               // m, of the grid where there is no top wall

@@ -54,7 +54,7 @@ SpringEnergy spring_energy(const Scene& scene, const State& s) {
 double kinetic_energy(const Scene& scene, const State& s) {
   double sum = 0;
   for (Index i = 0; i < s.size(); ++i) {
-    const double m = sphere_mass(scene.density, s.r[i]), inertia = 0.4 * m * s.r[i] * s.r[i];
+    const double m = scene.inertial_mass(s.r[i]), inertia = 0.4 * m * s.r[i] * s.r[i];
     Vec3d v = s.v[i], omega = s.omega[i];
     if (s.staggered) {
       const Mobility mob = mobility(scene, s.r[i], s.part_of[i]);

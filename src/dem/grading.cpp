@@ -33,25 +33,28 @@ double radius_at(const SizeRange& range, double u) {
 
 }  // namespace
 
-std::vector<SizeRange> ranges_of(const std::vector<Sieve>& sieves) {
+std::vector<SizeRange> ranges_of(const std::vector<Sieve>& sieves,
+                                 const std::function<std::string(std::size_t)>& name) {
   if (sieves.size() < 2) throw error("a grading has ", sieves.size(), " sieves; expected two or more");
+  const auto at = [&](std::size_t k) { return name ? name(k) : text("sieve ", k + 1); };
   for (std::size_t k = 0; k < sieves.size(); ++k) {
     const Sieve& s = sieves[k];
     if (!(s.size > 0) || !std::isfinite(s.size))
-      throw error("sieve ", k + 1, ": size ", s.size, " m; expected more than 0");
+      throw error(at(k), ": size ", s.size, " m; expected more than 0");
     if (!(s.passing >= 0 && s.passing <= 1))
-      throw error("sieve ", k + 1, ": ", 100 * s.passing, " % finer; expected 0 to 100");
+      throw error(at(k), ": ", 100 * s.passing,
+                  " % finer; expected 0 to 100 (in a column \"finer (%)\"; without a unit shares, 0 to 1)");
     if (k > 0 && !(s.size > sieves[k - 1].size && s.passing >= sieves[k - 1].passing))
-      throw error("sieve ", k + 1, " (", s.size, " m, ", 100 * s.passing, " %) after one of ",
-                  sieves[k - 1].size, " m, ", 100 * sieves[k - 1].passing,
+      throw error(at(k), " (", s.size, " m, ", 100 * s.passing, " %) after one of ", sieves[k - 1].size,
+                  " m, ", 100 * sieves[k - 1].passing,
                   " %; expected larger sizes with as much or more that is finer, from the finest on");
   }
   if (sieves.front().passing != 0)
-    throw error("the finest sieve, ", sieves.front().size, " m, has ", 100 * sieves.front().passing,
+    throw error(at(0), ": the finest sieve, ", sieves.front().size, " m, has ", 100 * sieves.front().passing,
                 " % finer; expected 0, or it is not known how fine the rest is");
   if (std::abs(sieves.back().passing - 1) > 1e-9)
-    throw error("the coarsest sieve, ", sieves.back().size, " m, has ", 100 * sieves.back().passing,
-                " % finer; expected 100");
+    throw error(at(sieves.size() - 1), ": the coarsest sieve, ", sieves.back().size, " m, has ",
+                100 * sieves.back().passing, " % finer; expected 100");
   std::vector<SizeRange> ranges;
   double total = 0;
   for (std::size_t k = 1; k < sieves.size(); ++k) {

@@ -1,7 +1,9 @@
 // Sizes of grains: radii drawn from a grading. Throws Error where a grading is none.
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <random>
+#include <string>
 #include <vector>
 
 namespace moraine::dem {
@@ -32,8 +34,10 @@ struct SizeRange {
   double count;  // share of the number of grains
 };
 
-// Between two sieves mass is spread evenly over the logarithm of size.
-std::vector<SizeRange> ranges_of(const std::vector<Sieve>& sieves);
+// Between two sieves mass is spread evenly over the logarithm of size. Errors call the k-th sieve, from 0,
+// name(k); "sieve 1" and so on without one.
+std::vector<SizeRange> ranges_of(const std::vector<Sieve>& sieves,
+                                 const std::function<std::string(std::size_t)>& name = {});
 // n radii by these shares, largest first: one from each n-th part of the distribution, so that even the few
 // largest grains are as many as they should be.
 std::vector<double> draw_radii(const std::vector<SizeRange>& ranges, std::int64_t n, Random& random);

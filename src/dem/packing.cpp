@@ -78,7 +78,8 @@ class RandomPlaces {
       for (Index k = low[2]; k <= high[2]; ++k)
         for (Index j = low[1]; j <= high[1]; ++j)
           for (Index i = low[0]; i <= high[0]; ++i)
-            for (const Index g : c.cells[c.index((i + c.n[0]) % c.n[0], (j + c.n[1]) % c.n[1], (k + c.n[2]) % c.n[2])]) {
+            for (const Index g :
+                 c.cells[c.index((i + c.n[0]) % c.n[0], (j + c.n[1]) % c.n[1], (k + c.n[2]) % c.n[2])]) {
               Vec3d d = x - x_[g];
               for (int a = 0; a < 3; ++a)
                 if (periodic_[a]) d[a] -= box_[a] * std::round(d[a] / box_[a]);
@@ -163,7 +164,9 @@ LooseGrains at_random_places(const Packing& p, std::vector<double> r, Random& ra
     box.z = std::max(loose / (p.box_x * p.box_y), most);
   for (const double side : {box.x, box.y, box.z})
     if (side < most)
-      throw error("the largest grain, of ", 2 * r[0], " m, does not fit into a box ", side, " m wide");
+      throw error(
+          "the largest grain, ", 2 * r[0], " m wide, does not fit into a box ", side,
+          " m wide; expected a wider box (box.x, box.y), or smaller sizes (those without a unit are in m)");
   RandomPlaces places(box, p.periodic_x, p.periodic_y, p.periodic_z);
   for (std::size_t i = 0; i < r.size(); ++i)
     if (!places.put(r[i], random))

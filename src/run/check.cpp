@@ -36,7 +36,8 @@ void print_water(const cases::Case& c, const Stage& stage, const dem::State& s,
   for (const double r : s.r) volume += dem::sphere_volume(r);
   const double phi =
       std::clamp(1 - volume / (stage.scene.area() * height), w.porosity_range[0], w.porosity_range[1]);
-  const double k = w.k_c * phi * phi * phi / ((1 - phi) * (1 - phi));
+  const double sauter = sauter_diameter(s), k_c = w.k_c > 0 ? w.k_c : sauter * sauter / 180,
+               k = k_c * phi * phi * phi / ((1 - phi) * (1 - phi));
   const double m = modulus(c, s, 1 - phi, stage.diameter), storage = phi * w.compressibility;
   const double d = k / (w.viscosity * storage), c_v = k / (w.viscosity * (1 / m + storage));
   const coupling::Stability stability = water.stability();
@@ -49,9 +50,12 @@ void print_water(const cases::Case& c, const Stage& stage, const dem::State& s,
               stage.scene.box.x / w.cells[0] / stage.diameter, h / stage.diameter, largest / stage.diameter);
   std::printf("    exchange    every %.4g s; stable up to %.4g s (contacts %.3g rad/s, water %.3g rad/s)\n",
               interval, stability.longest_dt, stability.w_sk, stability.w_f);
-  if (c.fluid.permeability_factor == 0)
-    std::printf("    k_c         %.3g m2 = d^2/180 with the Sauter mean diameter d = %.4g m\n", w.k_c,
-                sauter_diameter(s));
+  if (w.k_c == 0)
+    std::printf(
+        "    k_c         %.3g m2 = d^2/180 with the Sauter mean diameter d = %.4g m; in each cell that of "
+        "its "
+        "grains\n",
+        k_c, sauter);
   std::printf(
       "    water       k = %.3g m2 at porosity %.3g; D = k/(mu phi beta) = %.3g m2/s; diffusion number "
       "%.3g\n",
@@ -67,6 +71,30 @@ void print_water(const cases::Case& c, const Stage& stage, const dem::State& s,
     std::printf("                where the bed dilates by 0.1 of its shear, water falls by about %.3g Pa\n",
                 drop);
   }
+}
+
+constexpr double long_run = 7 * 86400, short_step = 1e-9, a_day = 86400;  // s
+
+// The step goes as r^1.5 k^-0.5, by the smallest grain.
+void print_what_would_do(const cases::Case& c, const dem::GradingSummary& sizes, double total) {
+  std::printf(
+      "  shorter       the smallest grain, %.3g m wide, and k_n = %.3g N/m set the step: a tenth of the time "
+      "with "
+      "4.6 times larger ones",
+      sizes.smallest, c.contact.k_n);
+  const std::string where = !c.start.empty()                       ? "in the start"
+                            : c.grains.distribution == "sieves"    ? "grains.sieves"
+                            : c.grains.distribution == "lognormal" ? "grains.radius_min, or radius_mean"
+                                                                   : "grains.radius_min";
+  std::printf(" (%s), or with 100 times softer contacts (model.softening)\n", where.c_str());
+  // Heavier small grains belong here, too, once a case can have them.
+  if (total <= a_day) return;
+  const double shorten = total / a_day, size = sizes.smallest * std::pow(shorten, 2.0 / 3);
+  if (size < sizes.d50)
+    std::printf("                a day in all with none below %.3g m (D50 is %.3g m)", size, sizes.d50);
+  else
+    std::printf("                more than a day even with all at D50, %.3g m", sizes.d50);
+  std::printf("; or with model.softening = %.2g\n", c.softening * shorten * shorten);
 }
 
 }  // namespace
@@ -136,7 +164,8 @@ void check_case(const Options& options) {
   std::printf("  backend       %s\n", engine->describe().c_str());
   Estimate estimate(c, start, *engine);
   double total = 0;
-  bool complete = true;
+  bool complete = true, any = false;                          // of the stages' times is known
+  double shortest = std::numeric_limits<double>::infinity();  // s, step
   for (std::size_t k = 0; k < c.stages.size(); ++k) {
     const cases::Stage& wanted = c.stages[k];
     output::Checkpoint now = foreseen(c, k, start);
@@ -153,7 +182,7 @@ void check_case(const Options& options) {
     Estimate::Time time{steps, std::numeric_limits<double>::quiet_NaN()};
     std::string unknown;
     try {
-      time = estimate.stage(k, duration);
+      time = estimate.stage(k, duration, scene.dt);
       total += time.seconds;
     } catch (const Error& why) {  // of a bed that was made up, which the run may never meet
       unknown = why.what();
@@ -192,9 +221,20 @@ void check_case(const Options& options) {
                   time.ms());
     else
       std::printf("    time        not known: %s\n", unknown.c_str());
+    shortest = std::min(shortest, scene.dt), any = any || unknown.empty();
   }
-  std::printf("  all           about %s, timed on beds like those to come%s\n", readable_time(total).c_str(),
-              complete ? "" : "; without stages whose time is not known");
+  if (any)
+    std::printf("  all           about %s, timed on beds like those to come%s\n",
+                readable_time(total).c_str(), complete ? "" : "; without stages whose time is not known");
+  else
+    std::printf("  all           not known\n");
+  if (estimate.of_one_size())
+    std::printf(
+        "                but of grains of one size: 1:%.0f make no bed in a moment; moraine bench times "
+        "steps of "
+        "one that has settled\n",
+        sizes.largest / sizes.smallest);
+  if (c.dt == 0 && (total > long_run || shortest < short_step)) print_what_would_do(c, sizes, total);
   for (const std::string& w : warnings) std::printf("  warning: %s\n", w.c_str());
 }
 

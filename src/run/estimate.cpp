@@ -50,6 +50,20 @@ Start narrower(Start s) {
   return s;
 }
 
+bool is_wide(const std::vector<double>& r) {
+  const auto [smallest, largest] = std::minmax_element(r.begin(), r.end());
+  return *largest > widest * *smallest;
+}
+
+// As many, of the same volume together.
+Start in_one_size(Start s) {
+  std::vector<double>& r = s.before.state.r;
+  double cubes = 0;
+  for (const double radius : r) cubes += radius * radius * radius;
+  std::fill(r.begin(), r.end(), std::cbrt(cubes / static_cast<double>(r.size())));
+  return s;
+}
+
 // At random, but evenly, below `height`.
 std::vector<dem::Vec3d> scattered(const std::vector<double>& r, double box_x, double box_y, double height) {
   const auto n = static_cast<std::int64_t>(r.size());
@@ -78,18 +92,17 @@ double median(std::vector<double> v) {
 
 Estimate::Estimate(const cases::Case& c, const Start& start, dem::Engine& engine)
     : case_(c),
-      start_(c.start.empty() ? narrower(start) : start),
+      loose_(c.start.empty() && c.floor && !c.periodic_z),
+      one_size_(loose_ && is_wide(start.before.state.r)),
+      start_(one_size_         ? in_one_size(narrower(start))
+             : c.start.empty() ? narrower(start)
+                               : start),
       engine_(engine),
       scale_(static_cast<double>(start.before.state.size()) / start_.before.state.size()),
-      loose_(c.start.empty() && c.floor && !c.periodic_z),
       packed_(start_.before.state) {}
 
 void Estimate::pack() {
   const std::vector<double>& r = start_.before.state.r;
-  const auto [smallest, largest] = std::minmax_element(r.begin(), r.end());
-  if (*largest > widest * *smallest)
-    throw error("sizes of 1:", std::round(*largest / *smallest),
-                " make no bed in a moment; moraine bench times steps of one that has settled");
   dem::Scene scene;
   scene.box = {start_.box_x, start_.box_y, 0};
   scene.density = case_.grains.density, scene.gravity = 0, scene.ledger = false;
@@ -189,7 +202,7 @@ double Estimate::processor_time() const {
          (here ? engine_.threads() : 1);
 }
 
-Estimate::Time Estimate::stage(std::size_t index, double duration) {
+Estimate::Time Estimate::stage(std::size_t index, double duration, double dt) {
   const cases::Stage& wanted = case_.stages[index];
   if (loose_ && packed_.contacts.empty()) pack();
   dem::State bed = loose_ ? with_contacts(expected_contacts(wanted)) : packed_;
@@ -203,14 +216,15 @@ Estimate::Time Estimate::stage(std::size_t index, double duration) {
     bed.step = 0, bed.water_force.clear(), bed.water = {};
     stage.scene.exchange_interval = 0;
   }
+  if (one_size_) stage.scene.dt = dt;
   const double steps = std::max(1.0, std::round(duration / stage.scene.dt));
   double speed = 0;  // m/s, of the fastest grain
   if (wanted.kind == Kind::shear) speed = 3 * std::abs(layer_velocity(stage.scene));
   if (wanted.normal_stress > 0)  // what the wall has pushed comes to rest in a small part of the stage
     speed = std::max(speed, 0.02 * std::sqrt(wanted.normal_stress / case_.grains.density));
   const double way = bed_top(start_.before.state) - bed_top(bed);
-  const bool falls =
-      loose_ && index == 0 && way > 0 && case_.gravity > 0 && !stage.scene.has(dem::BodyId::top_wall);
+  const bool falls = loose_ && !one_size_ && index == 0 && way > 0 && case_.gravity > 0 &&
+                     !stage.scene.has(dem::BodyId::top_wall);
   const double each = falls ? falling(stage, bed, way, duration) : per_step(stage, bed, speed);
   return {steps, scale_ * (steps * each + rows(stage, bed, duration))};
 }

@@ -9,6 +9,9 @@
 //
 // Loose grains settle in three parts: until T = sqrt(2 D/g), D the way down of the highest grain, they fall
 // and land, a share (t/T)^2 of them; for as long again they bounce; then they lie.
+//
+// Sizes of more than 1:4 are scattered unevenly, small grains within large ones. As many grains of one size,
+// of the same volume together, are timed in their place, in a bed from the first step on.
 #pragma once
 #include "case/case.hpp"
 #include "dem/engine.hpp"
@@ -25,7 +28,9 @@ class Estimate {
     double seconds;  // of the clock
     double ms() const { return 1e3 * seconds / steps; }
   };
-  Time stage(std::size_t index, double duration);  // s of model time
+  // duration: s of model time; dt: s, of the stage's grains.
+  Time stage(std::size_t index, double duration, double dt);
+  bool of_one_size() const { return one_size_; }  // whether grains of one size are timed
 
  private:
   void pack();
@@ -36,10 +41,11 @@ class Estimate {
   double rows(const Stage& stage, const dem::State& bed, double duration);
 
   const cases::Case& case_;
+  bool loose_;  // whether grains start apart; else the bed of the start is timed
+  bool one_size_;
   Start start_;  // of fewer grains where there are many
   dem::Engine& engine_;
   double scale_;  // grains of the case over those timed
-  bool loose_;    // whether they start apart; else the bed of the start is timed
   dem::State packed_;
 };
 

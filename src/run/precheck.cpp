@@ -52,7 +52,7 @@ void check_step(const Stage& stage, const dem::State& s, std::vector<std::string
   const double dt = stage.scene.dt;
   const auto smallest = static_cast<dem::Index>(std::min_element(s.r.begin(), s.r.end()) - s.r.begin());
   const std::string about = text("stage ", stage.name, ": ");
-  const std::string of = text(" (grain ", s.id[smallest], ", the smallest)");
+  const std::string of = text(" (grain ", s.id[smallest], ", the smallest, of radius ", s.r[smallest], " m)");
   const std::vector<Mode> modes = modes_of(stage, s, s.r[smallest]);
   const auto room_of = [&](const Mode& m) { return 1 - 0.25 * m.k * m.w * dt * dt; };
   // Then the run will not pass the guards, and it is the step that must change.

@@ -22,8 +22,10 @@ std::string readable_time(double s) {
     std::snprintf(text, sizeof text, "%ld min %ld s", whole(s / 60), whole(s) % 60);
   else if (s < 86400)
     std::snprintf(text, sizeof text, "%ld h %ld min", whole(s / 3600), whole(s / 60) % 60);
-  else
+  else if (s < 1000.0 * 86400)
     std::snprintf(text, sizeof text, "%ld d %ld h", whole(s / 86400), whole(s / 3600) % 24);
+  else
+    std::snprintf(text, sizeof text, "%.3g years", s / (365.25 * 86400));
   return text;
 }
 

@@ -139,11 +139,10 @@ static std::vector<dem::Sieve> sieves_in(const std::filesystem::path& file) {
   const std::vector<double> size = table.column("size", "m"), finer = table.column("finer", "1");
   std::vector<dem::Sieve> sieves;
   for (std::size_t k = 0; k < size.size(); ++k) sieves.push_back({size[k], finer[k]});
-  try {
-    dem::ranges_of(sieves);
-  } catch (const Error& why) {
-    throw error(file.string(), ": ", why.what());
-  }
+  if (sieves.size() < 2)
+    throw error(file.string(), ": has ", sieves.size(),
+                " sieve; expected two or more, from 0 to 100 % finer");
+  dem::ranges_of(sieves, [&](std::size_t k) { return table.at(k); });
   return sieves;
 }
 
@@ -221,9 +220,9 @@ coupling::Water water_of(const cases::Case& c, const cases::Stage& stage, const 
   w.present = stage.fluid;
   if (!w.present) return w;
   const cases::Fluid& f = c.fluid;
-  const double diameter = mean_diameter(s), sauter = sauter_diameter(s);
+  const double diameter = mean_diameter(s);
   w.viscosity = f.viscosity, w.compressibility = f.compressibility;
-  w.k_c = f.permeability_factor > 0 ? f.permeability_factor : sauter * sauter / 180;
+  w.k_c = f.permeability_factor;
   w.porosity_range = {f.porosity_min, f.porosity_max};
   w.height = f.height > 0 ? f.height : height + f.cell * diameter;
   const bool wall = scene.has(BodyId::top_wall);

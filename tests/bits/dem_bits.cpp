@@ -53,7 +53,8 @@ void print_digests(std::int64_t settling, std::int64_t steps) {
     std::printf("%016llx  %s, %s, %zu contacts\n", static_cast<unsigned long long>(digest.value()), bed.name,
                 engine, end.contacts.size());
   };
-  const std::vector<NamedBed> beds = named_beds(bed_after(settling), walled_bed_after(settling));
+  const std::vector<NamedBed> beds =
+      named_beds(bed_after(settling), walled_bed_after(settling), make_graded_bed(3));
   for (const NamedBed& bed : beds) print(bed, "one thread", Backend::cpu, 1);
   print(beds[0], "two threads", Backend::cpu, 2);
   print(beds[0], "the GPU's loop", Backend::reference, 1);

@@ -11,11 +11,18 @@ struct End {
   WaterState water;
 };
 
-// Without damping pushes are not kept from step to step.
-WetBed sheared(bool damped) {
-  WetBed bed = pressed_bed();
+struct Kind {
+  int interval;
+  bool damped;          // without damping pushes are not kept from step to step
+  bool graded = false;  // sizes 1:20, permeability by the grains of each cell
+};
+constexpr Kind kinds[] = {{1, true}, {2, true}, {1, false}, {2, true, true}, {1, false, true}};
+
+WetBed sheared(bool damped, bool graded = false) {
+  WetBed bed = graded ? pressed_graded() : pressed_bed();
   if (!damped)
     for (dem::ContactParameters& p : bed.scene.contact) p.gamma_n = p.gamma_t = 0;
+  if (graded) return bed;
   for (dem::Index i = 0; i < bed.state.size(); ++i) bed.state.v[i] = {2 * bed.state.x[i].z, 0.1, 0};
   return bed;
 }
@@ -43,15 +50,17 @@ End after(WetRun&& run, int steps) {
 }
 
 TEST(SameBitsInWater, ForAnyThreadsAndOnTheGpusLoop) {
-  for (const auto& [m, damped] : {std::pair{1, true}, {2, true}, {1, false}}) {
-    const WetBed bed = sheared(damped);
+  for (const auto& [m, damped, graded] : kinds) {
+    const WetBed bed = sheared(damped, graded);
     Water w = water_over(bed);
-    w.interval = m, w.k_c = 1e-11;
-    const End one = after(WetRun(bed, w), 1500);
+    w.interval = m, w.k_c = graded ? 0 : 1e-11;
+    if (graded) w.cells = {3, 3, 2};
+    const int steps = graded ? 300 : 1500, many = graded ? 3 : 4;
+    const End one = after(WetRun(bed, w), steps);
     EXPECT_GT(one.water.exchanges, 100);
-    expect_same(one, after(WetRun(bed, w, {}, dem::Backend::cpu, 2), 1500));
-    expect_same(one, after(WetRun(bed, w, {}, dem::Backend::cpu, 4), 1500));
-    expect_same(one, after(WetRun(bed, w, {}, dem::Backend::reference, 2), 1500));
+    expect_same(one, after(WetRun(bed, w, {}, dem::Backend::cpu, 2), steps));
+    expect_same(one, after(WetRun(bed, w, {}, dem::Backend::cpu, many), steps));
+    expect_same(one, after(WetRun(bed, w, {}, dem::Backend::reference, 2), steps));
   }
 }
 
@@ -71,10 +80,11 @@ TEST(SameBitsInWater, StepByStep) {
 }
 
 TEST(SameBitsInWater, AfterARestart) {
-  for (const auto& [m, damped] : {std::pair{1, true}, {2, true}, {1, false}}) {
-    const WetBed bed = sheared(damped);
+  for (const auto& [m, damped, graded] : kinds) {
+    const WetBed bed = sheared(damped, graded);
     Water w = water_over(bed);
-    w.interval = m, w.k_c = 1e-11, w.top = TopSide::impermeable, w.sides = {};
+    if (graded) w.cells = {3, 3, 2};
+    w.interval = m, w.k_c = graded ? 0 : 1e-11, w.top = TopSide::impermeable, w.sides = {};
     const End whole = after(WetRun(bed, w), 1500);
     for (const int at : {100, 300, 900}) {
       WetRun first(bed, w);

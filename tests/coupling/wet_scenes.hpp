@@ -169,6 +169,16 @@ inline const WetBed& heavy_bed() {  // settled, without a wall
   return bed;
 }
 
+// Sizes 1:20 under a light wall, sheared and drifting.
+inline WetBed pressed_graded() {
+  const dem::Bed& settled = dem::graded_bed();
+  WetBed bed{settled.scene, settled.state};
+  bed.scene.body(dem::BodyId::top_wall) = dem::wall_pressed_by(500, 0.5);
+  bed.state.wall_z() = bed_top(bed.state);
+  for (dem::Index i = 0; i < bed.state.size(); ++i) bed.state.v[i] = {2 * bed.state.x[i].z, 0.1, 0};
+  return bed;
+}
+
 // Real water in cells some 2.5 diameters wide; drained at the top.
 inline Water water_over(const WetBed& bed, double height = 0) {
   Water w;
@@ -263,10 +273,12 @@ inline double largest_difference(const std::vector<double>& a, const std::vector
 }
 
 // What the grains gain the water loses, under either top. also(state, sum of |force|): what else must hold.
+// cells: others than those of water_over().
 template <class Also>
-void expect_momentum_kept(const WetBed& bed, Also&& also) {
+void expect_momentum_kept(const WetBed& bed, Also&& also, const std::array<int, 3>& cells = {}) {
   for (const TopSide top : {TopSide::drained, TopSide::impermeable}) {
     Water w = water_under(bed, top);
+    if (cells[0] > 0) w.cells = cells;
     if (top == TopSide::drained) w.sides.high[2].value = 3e3;
     WetRun run(bed, w);
     run.advance(3000);

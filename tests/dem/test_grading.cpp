@@ -58,6 +58,50 @@ TEST(Grading, FractalNumbers) {
   for (const int k : {1, 2}) EXPECT_NEAR(finer(r, 2 * 1e-3 * (1 << k)), k / 3.0, 0.01);
 }
 
+// One grain comes from each n-th part, so that a sieve is missed by a grain or two of about its size.
+TEST(Grading, WideTablesAreDrawnToAGrain) {
+  const std::vector<std::vector<Sieve>> tables = {
+      {{1e-3, 0}, {2e-3, 0.2}, {5e-3, 0.5}, {10e-3, 0.75}, {20e-3, 1}},      // 1:20
+      {{1e-3, 0}, {1.5e-3, 0.4}, {10e-3, 0.4}, {20e-3, 1}},                  // bimodal: none between
+      {{0.1e-3, 0}, {0.2e-3, 0.1}, {0.5e-3, 0.3}, {1e-3, 0.6}, {2e-3, 1}}};  // finer
+  for (const auto& table : tables)
+    for (const std::uint64_t seed : {1, 2, 3}) {
+      Random random(seed);
+      const std::vector<double> r = draw_radii(ranges_of(table), 50000, random);
+      double all = 0;
+      for (const double radius : r) all += std::pow(2 * radius, 3);
+      for (const Sieve& s : table)
+        EXPECT_NEAR(finer(r, s.size), s.passing, 3 * std::pow(s.size, 3) / all + 2e-3) << s.size;
+      for (std::size_t k = 1; k < table.size(); ++k)
+        if (table[k].passing == table[k - 1].passing) {
+          const auto between = std::count_if(r.begin(), r.end(), [&](double radius) {
+            return 2 * radius > table[k - 1].size * (1 + 1e-12) && 2 * radius < table[k].size * (1 - 1e-12);
+          });
+          EXPECT_EQ(between, 0);
+        }
+    }
+}
+
+// Slope of log(number in a class of sizes) over log(size): -D. Of 2e5 grains the rarest class has some
+// hundred, of which one or so is a matter of chance.
+TEST(Grading, FractalDimensionByRegression) {
+  for (const double D : {1.5, 2.6, 3.0}) {
+    Random random(5);
+    const double low = 1e-3, high = D < 2 ? 20e-3 : 10e-3;
+    const std::vector<double> r = draw_radii({{low, high, D, 1}}, 200000, random);
+    constexpr int classes = 10;
+    std::vector<double> count(classes, 0);
+    for (const double radius : r)
+      ++count[std::min(classes - 1, int(classes * std::log(radius / low) / std::log(high / low)))];
+    double sx = 0, sy = 0, sxx = 0, sxy = 0;
+    for (int k = 0; k < classes; ++k) {
+      const double x = (k + 0.5) / classes * std::log(high / low), y = std::log(count[k]);
+      sx += x, sy += y, sxx += x * x, sxy += x * y;
+    }
+    EXPECT_NEAR((classes * sxy - sx * sy) / (classes * sxx - sx * sx), -D, 0.01);
+  }
+}
+
 TEST(Grading, OneSize) {
   Random random(1);
   EXPECT_EQ(draw_radii({{0.01, 0.01, 2.6, 1}}, 3, random), (std::vector<double>{0.01, 0.01, 0.01}));

@@ -177,5 +177,26 @@ TEST(Packing, LimitsOfLognormalRadii) {
   EXPECT_THROW(make_loose_grains(p), Error);
 }
 
+// Radii outside of the limits are drawn again: what is inside keeps its shape. ln r is normal, with mean
+// ln(mean) - s^2/2 and s^2 = ln(1 + (std/mean)^2); the share below r within the limits follows from that.
+TEST(Packing, LognormalBetweenLimits) {
+  Packing p;
+  p.count = 20000, p.columns_x = p.columns_y = 20, p.radius_mean = 0.01, p.radius_std = 0.004, p.seed = 2;
+  p.radius_min = 0.006, p.radius_max = 0.018;
+  std::vector<double> r = make_loose_grains(p).state.r;
+  std::sort(r.begin(), r.end());
+  EXPECT_GE(r.front(), p.radius_min);
+  EXPECT_LE(r.back(), p.radius_max);
+  const double s2 = std::log(1 + 0.16), mean = std::log(0.01) - s2 / 2;
+  const auto below = [&](double radius) {
+    return 0.5 * std::erfc((mean - std::log(radius)) / std::sqrt(2 * s2));
+  };
+  const double low = below(p.radius_min), all = below(p.radius_max) - low;
+  double worst = 0;  // Kolmogorov and Smirnov: 1.95/sqrt(n) once in a thousand
+  for (std::size_t k = 0; k < r.size(); ++k)
+    worst = std::max(worst, std::abs((k + 0.5) / r.size() - (below(r[k]) - low) / all));
+  EXPECT_LT(worst, 1.95 / std::sqrt(20000.0));
+}
+
 }  // namespace
 }  // namespace moraine::dem

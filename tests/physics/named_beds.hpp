@@ -13,8 +13,8 @@ struct NamedBed {
 inline void damp_grains(Scene& s, double gamma) {
   s.with(Material::grain).gamma_n = s.with(Material::grain).gamma_t = gamma;
 }
-// From a bed without side walls and one with them.
-inline std::vector<NamedBed> named_beds(const Bed& open, const Bed& walled) {
+// From a bed without side walls, one with them, and one of sizes 1:20.
+inline std::vector<NamedBed> named_beds(const Bed& open, const Bed& walled, const Bed& graded) {
   std::vector<NamedBed> a{{"sheared bed, damped walls", sheared_bed(open)},
                           {"softening", sheared_bed(open)},
                           {"layer driven by stress", sheared_bed(open)},
@@ -25,7 +25,9 @@ inline std::vector<NamedBed> named_beds(const Bed& open, const Bed& walled) {
                           {"cloud", cloud(700, 0.2, 5)},
                           {"small box", cloud(22, 0.065, 5)},
                           {"a side wall moves in", squeezed_bed(walled)},
-                          {"sheared along side walls", sheared_between_walls(walled)}};
+                          {"sheared along side walls", sheared_between_walls(walled)},
+                          {"sizes 1:20, damped, softening", sheared_graded_bed(graded)},
+                          {"sizes 1:20, held height", sheared_graded_bed(graded)}};
   for (ContactParameters& p : a[1].bed.scene.contact) p.mu_d = 0.3;
   drive_top_layer(a[2].bed.scene, Drive::by(400));
   damp_grains(a[2].bed.scene, 5);
@@ -35,6 +37,9 @@ inline std::vector<NamedBed> named_beds(const Bed& open, const Bed& walled) {
   a[4].bed.scene.with(Material::wall).k_t = 0, a[4].bed.scene.ledger = false;
   damp_grains(a[5].bed.scene, 5);
   for (ContactParameters& p : a[6].bed.scene.contact) p.mu_s = p.mu_d = 0;
+  damp_grains(a[11].bed.scene, 0.2);
+  for (ContactParameters& p : a[11].bed.scene.contact) p.mu_d = 0.3;
+  drive_top_layer(a[12].bed.scene, Drive::at(0.2), true);
   return a;
 }
 

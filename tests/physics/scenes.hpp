@@ -78,6 +78,37 @@ struct Bed {
   Scene scene;
   State state;
 };
+// Radii of five classes between `largest` and a twentieth of it, largest first; fewer small ones than would
+// make as much mass in each class, which takes thousands.
+inline std::vector<double> one_to_twenty(double largest) {
+  std::vector<double> r;
+  for (const auto& [part, count] : {std::pair{1, 3}, {2, 12}, {4, 70}, {8, 250}, {20, 300}})
+    r.insert(r.end(), count, largest / part);
+  return r;
+}
+
+// Grains at random places between the sides x, y and z of a box, the largest first, which overlap by a
+// twentieth of the sum of their radii at most. Sides count as periodic.
+inline std::vector<Vec3d> random_places(const std::vector<double>& r, const Vec3d& box, double overlap,
+                                        std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::vector<Vec3d> x;
+  for (std::size_t i = 0; i < r.size(); ++i)
+    for (bool free = false; !free;) {
+      Vec3d at{0, 0, 0};
+      for (int a = 0; a < 3; ++a) at[a] = box[a] * (static_cast<double>(random() >> 11) * 0x1p-53);
+      free = true;
+      for (std::size_t j = 0; j < i && free; ++j) {
+        Vec3d d = at - x[j];
+        for (int a = 0; a < 3; ++a) d[a] -= box[a] * std::rint(d[a] / box[a]);
+        const double least = (1 - overlap) * (r[i] + r[j]);
+        free = dot(d, d) > least * least;
+      }
+      if (free) x.push_back(at);
+    }
+  return x;
+}
+
 // Three hundred soft grains of mixed size after so many steps under their weight; x and y are periodic.
 inline Bed bed_after(std::int64_t steps, double margin = 0) {
   Packing p;
@@ -97,21 +128,50 @@ inline Bed bed_after(std::int64_t steps, double margin = 0) {
   out.state.step = 0, out.state.ledger = {};
   return out;
 }
+// Of sizes 1:20, x and y are periodic. Motion is taken out time and again, or small grains would long fly
+// about in the pores of the large; at first under many times the weight.
+inline Bed make_graded_bed(int bursts = 12) {
+  const std::vector<double> r = one_to_twenty(0.02);
+  Scene s;
+  s.box = {0.1, 0.1, 1};
+  s.contact.fill(LinearContact{1e5, 1e5, 0.5, 0.2, 0.5, 0.5});
+  s.dt = 0.1 * std::sqrt(mass(s, 0.001) / s.with(Material::grain).k_n);
+  std::vector<Vec3d> x = random_places(r, {0.1, 0.1, 0.06}, 0, 3);
+  for (Vec3d& at : x) at.z += 0.02;
+  Bed out{s, grains_at_rest(r, x)};
+  sort_spatially(s, out.state);
+  const auto engine = make_engine(Backend::cpu, 1);
+  for (int burst = 0; burst < bursts; ++burst) {
+    s.gravity = (burst < bursts / 2 ? 100 : burst < 3 * bursts / 4 ? 10 : 1) * out.scene.gravity;
+    out.state.step = 0, out.state.ledger = {};
+    for (auto* v : {&out.state.v, &out.state.omega}) std::fill(v->begin(), v->end(), Vec3d{0, 0, 0});
+    out.state = run(*engine, s, out.state, 4000);
+    synchronise(s, out.state);
+  }
+  out.state.step = 0, out.state.ledger = {};
+  sort_spatially(out.scene, out.state);
+  return out;
+}
+inline const Bed& graded_bed() {
+  static const Bed bed = make_graded_bed();
+  return bed;
+}
 inline const Bed& settled_bed() {  // at rest
   static const Bed bed = bed_after(60000);
   return bed;
 }
 
 // Sheared by its top layer under a loaded wall, with everything the contact law can do.
-inline void shear(Bed& bed) {
+// Layers: grains whose centre is so far, m, from the floor or from the top of the bed.
+inline void shear(Bed& bed, double bottom = 0.02, double upper = 0.03) {
   Scene& s = bed.scene;
   State& state = bed.state;
   double top = 0;
   for (Index i = 0; i < state.size(); ++i) top = std::max(top, state.x[i].z + state.r[i]);
   for (Index i = 0; i < state.size(); ++i)
-    state.part_of[i] = state.x[i].z < 0.02         ? BodyId::bottom_layer
-                       : state.x[i].z > top - 0.03 ? BodyId::top_layer
-                                                   : BodyId::none;
+    state.part_of[i] = state.x[i].z < bottom        ? BodyId::bottom_layer
+                       : state.x[i].z > top - upper ? BodyId::top_layer
+                                                    : BodyId::none;
   state.wall_z() = top;
   s.with(Material::grain).gamma_n = s.with(Material::grain).gamma_t = 0;
   s.body(BodyId::top_wall) = wall_pressed_by(500, 0.5);
@@ -119,6 +179,11 @@ inline void shear(Bed& bed) {
 }
 inline Bed sheared_bed(Bed bed = settled_bed()) {
   shear(bed);
+  return bed;
+}
+
+inline Bed sheared_graded_bed(Bed bed = graded_bed()) {
+  shear(bed, 0.012, 0.021);
   return bed;
 }
 
@@ -205,6 +270,30 @@ inline Bed cloud(Index count, double side, std::uint64_t seed) {
     c.state.omega[i] = {uniform(-50, 50), uniform(-50, 50), uniform(-50, 50)};
   }
   sort_spatially(c.scene, c.state);
+  return c;
+}
+
+// The same with as much mass in each of five classes between 1:20, some eight thousand grains. Closed: z is
+// periodic, too; else open, and without a floor.
+inline Bed graded_cloud(bool closed, std::uint64_t seed) {
+  std::vector<double> r;
+  for (const int part : {1, 2, 4, 10, 20})  // one or two of the largest, as many of others as that makes
+    r.insert(r.end(), part * part * part, 0.02 / part);
+  Bed c{{}, grains_at_rest(r, random_places(r, {0.09, 0.09, 0.09}, 0.05, seed))};
+  Scene& s = c.scene;
+  s.box = {0.09, 0.09, 0.09};
+  s.periodic_z = closed, s.body(BodyId::floor) = {}, s.gravity = 0;
+  s.contact.fill(LinearContact{1e5, 1e5, 0, 0, 0.5, 0.5});
+  s.dt = 0.1 * std::sqrt(mass(s, 0.001) / 1e5);
+  std::mt19937_64 random(seed + 1);
+  const auto uniform = [&](double most) {
+    return most * (2 * (static_cast<double>(random() >> 11) * 0x1p-53) - 1);
+  };
+  for (Index i = 0; i < c.state.size(); ++i) {
+    c.state.v[i] = {uniform(1), uniform(1), uniform(1)};
+    c.state.omega[i] = {uniform(50), uniform(50), uniform(50)};
+  }
+  sort_spatially(s, c.state);
   return c;
 }
 

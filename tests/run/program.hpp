@@ -86,6 +86,23 @@ class Program : public testing::Test {
     return contents(fs::path(MORAINE_SOURCE_DIR) / "tests/run/small-bed/case.toml");
   }
 
+  // The same with sizes of some 1:18 at random places.
+  static std::string graded_case() {
+    std::string text = small_case();
+    const auto replace = [&](const std::string& old, const std::string& now) {
+      text.replace(text.find(old), old.size(), now);
+    };
+    replace("[grains]", "[guards]\nmax_overlap = 0.5\n[box]\nx = 0.3\ny = 0.3\n[grains]");
+    replace("columns_x = 5\ncolumns_y = 5\ncell = 1.3",
+            "distribution = \"fractal\"\nfractal_dimension = 1.2\nradius_min = 0.003\nradius_max = 0.06\n"
+            "placement = \"random\"");
+    replace("0.6 s", "0.1 s"), replace("0.2 s", "0.05 s"), replace("strain = 0.2", "strain = 0.03");
+    replace("gamma_n = 10", "gamma_n = 2"),
+        replace("strain = 0.03", "strain = 0.03\nbottom_layer = 0.04\ntop_layer = 0.06");
+    for (std::size_t at; (at = text.find("= 40")) != std::string::npos;) text.replace(at, 4, "= 5");
+    return text;
+  }
+
   // A directory with that case.toml.
   fs::path make(const std::string& name, const std::string& text) const {
     return directory.write(name + "/case.toml", text).parent_path();

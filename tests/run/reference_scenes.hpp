@@ -55,6 +55,17 @@ inline std::vector<std::string> in_water(const std::vector<std::string>& keys) {
   return joined({"fluid.enabled=true", "fluid.compressibility=1e-6", "fluid.permeability_factor=1e-9"}, keys);
 }
 
+// The small bed's stages with sizes of some 1:18 at random places.
+inline std::vector<std::string> graded(const std::vector<std::string>& more = {}) {
+  return joined({"grains.distribution=fractal", "grains.fractal_dimension=1.2", "grains.radius_min=0.003",
+                 "grains.radius_max=0.06", "grains.placement=random", "box.x=0.3", "box.y=0.3",
+                 "stage.settle.duration=0.08", "stage.settle.gamma_n=2", "stage.settle.wall_gamma_n=5",
+                 "stage.settle.wall_gamma_t=5", "stage.consolidate.duration=0.03",
+                 "stage.consolidate.wall_gamma_n=5", "stage.consolidate.wall_gamma_t=5",
+                 "stage.shear.strain=0.015", "stage.shear.bottom_layer=0.04", "stage.shear.top_layer=0.06"},
+                more);
+}
+
 inline const std::vector<ReferenceScene>& reference_scenes() {
   static const std::vector<ReferenceScene> list{
       {"small_bed", small_bed, {}, margins | pieces},
@@ -68,6 +79,7 @@ inline const std::vector<ReferenceScene>& reference_scenes() {
        {"grains.distribution=uniform", "grains.radius_min=0.012", "grains.radius_max=0.028",
         "stage.settle.duration=0.3", "stage.shear.strain=0.05"},
        margins | reference},
+      {"graded", small_bed, graded(), margins | reference | pieces | threads},
       {"imported",
        "imported",
        {"stage.s.kind=shear", "stage.s.normal_stress=1e4", "stage.s.strain_rate=0.05",
@@ -136,6 +148,10 @@ inline const std::vector<ReferenceScene>& reference_scenes() {
       {"wet_gradient_only", "bed", in_water(sheared({"fluid.closure=pressure_gradient"}))},
       {"wet_no_ledger", "bed", in_water(sheared({"model.ledger=false"}))},
       {"wet_cholmod", "bed", in_water(sheared({"fluid.solver=cholmod"}))},
+      {"wet_graded", small_bed,
+       graded({"fluid.compressibility=1e-6", "stage.consolidate.fluid=true", "stage.shear.fluid=true",
+               "fluid.cells_x=3", "fluid.cells_y=3", "fluid.cells_z=3"}),
+       margins | reference | pieces},
       {"wet_after_dry",
        small_bed,
        {"fluid.compressibility=1e-6", "fluid.permeability_factor=1e-8", "stage.consolidate.fluid=true",

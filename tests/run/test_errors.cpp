@@ -172,6 +172,81 @@ TEST_F(Errors, GrainsOverlapAtTheStart) {
   expect_error(to_run(small, {"box.x=0.1"}), {"overlap at the start", "grains.columns_x", "grains.cell"});
 }
 
+class Gradings : public Errors {
+ protected:
+  // 400 grains at random places.
+  fs::path graded(const std::string& name, const std::string& grains) const {
+    return make(name, "[box]\nx = 0.1\ny = 0.1\n[grains]\ncount = 400\nplacement = \"random\"\n" + grains +
+                          "[wall]\ngamma_n = 0\ngamma_t = 0\n[[stage]]\nname = \"settle\"\nkind = "
+                          "\"settle\"\nduration = 1\n");
+  }
+  void expect_refused(const std::string& name, const std::string& grains,
+                      const std::vector<std::string>& words) const {
+    expect_error({"check", graded(name, grains).string()}, words);
+  }
+};
+
+TEST_F(Gradings, SieveTables) {
+  const auto expect = [&](const std::string& name, const std::string& table,
+                          const std::vector<std::string>& words) {
+    directory.write(name + "/sieves.csv", table);
+    expect_refused(name, "distribution = \"sieves\"\nsieves = \"sieves.csv\"\n", words);
+  };
+  const std::string head = "size (mm), finer (%)\n";
+  expect("coarsest", "# of a till\n" + head + "1, 0\n2, 90\n",
+         {"sieves.csv, line 4: the coarsest sieve, 0.002 m, has 90 % finer; expected 100"});
+  expect("finest", head + "1, 10\n2, 100\n",
+         {"sieves.csv, line 2: the finest sieve, 0.001 m, has 10 % finer"});
+  expect("negative", head + "-1, 0\n2, 100\n", {"sieves.csv, line 2: size -0.001 m; expected more than 0"});
+  expect("down", head + "1, 0\n2, 60\n3, 50\n4, 100\n", {"sieves.csv, line 4 (0.003 m, 50 %)"});
+  expect("turned", head + "2, 100\n1, 0\n", {"sieves.csv, line 3", "from the finest on"});
+  expect("share", "size (mm), finer\n1, 0\n2, 100\n", {"line 3: 10000 % finer", "a column \"finer (%)\""});
+  expect("metres", "size, finer (%)\n1, 0\n2, 100\n",
+         {"does not fit into a box", "those without a unit are in m"});
+  expect("one", head + "1, 0\n", {"sieves.csv: has 1 sieve; expected two or more"});
+  expect("empty", "", {"sieves.csv: is empty"});
+  expect("words", head + "1, 0\n2, all\n", {"sieves.csv, line 3: finer = \"all\"; expected a number"});
+}
+
+TEST_F(Gradings, SizesThatAreNone) {
+  expect_refused("negative", "distribution = \"fractal\"\nradius_min = -1e-3\nradius_max = 0.01\n",
+                 {"case.toml:", "grains.radius_min = -0.001", "expected >= 0 m"});
+  expect_refused("zero", "distribution = \"fractal\"\nradius_max = 0.01\n",
+                 {"grains.radius_min", "expected > 0 m for fractal radii"});
+  expect_refused("crossed", "distribution = \"fractal\"\nradius_min = 0.02\nradius_max = 0.01\n",
+                 {"grains.radius_max = 0.01", "expected at least grains.radius_min = 0.02"});
+  expect_refused("none", "radius_min = 0.03\n",
+                 {"no radius between grains.radius_min = 0.03 m", "expected limits around the mean, 0.02 m"});
+}
+
+// What a step of 1e-9 s and less costs, and what would do.
+TEST_F(Gradings, WhoseSmallestGrainsTakeTooLong) {
+  const auto said = [&](const std::string& name, const std::string& grains) {
+    const Outcome o = moraine({"check", graded(name, grains).string(), "--threads", "1", "--backend", "cpu"});
+    EXPECT_EQ(o.status, 0) << o.err;
+    return o.out;
+  };
+  const auto expect = [](const std::string& out, const std::vector<std::string>& words) {
+    for (const std::string& word : words)
+      EXPECT_NE(out.find(word), std::string::npos) << "no \"" << word << "\" in: " << out;
+  };
+  const std::string fractal = "distribution = \"fractal\"\nradius_max = 0.01\n";
+  const std::string tiny = said("tiny", fractal + "radius_min = 1e-5\n");
+  expect(tiny, {"step        7.26", "e-12 s", " steps for 1 s", "\n    time        about ", " d ",
+                "ms a step", "of grains of one size: 1:1",
+                "the smallest grain, 2e-05 m wide, and k_n = 1.16e+09 N/m set the step",
+                "a tenth of the time with 4.6 times larger ones (grains.radius_min)", "(model.softening)",
+                "a day in all with none below ", "; or with model.softening = "});
+  EXPECT_EQ(tiny.find("about 0.0 s"), std::string::npos) << tiny;
+  directory.write("sieved/sieves.csv", "size (um), finer (%)\n1, 0\n5, 100\n");
+  expect(said("sieved", "distribution = \"sieves\"\nsieves = \"sieves.csv\"\n"),
+         {"more than a day even with all at D50", "4.6 times larger ones (grains.sieves)"});
+  // The usual viscosity of walls is no longer stable there: which grain, how small, and what would be.
+  expect_error({"check", graded("damped", fractal + "radius_min = 1e-5\n").string(), "--set",
+                "stage.settle.wall_gamma_n=1e4"},
+               {"wall_gamma_n = 10000 N s/m", "the smallest, of radius 1.0", "unstable; expected at most "});
+}
+
 // Two grains in one place, as a damaged or foreign start file may hold them.
 TEST_F(Errors, GrainsOfTheStartInOnePlace) {
   const fs::path bed = make("bed", "stages = [\"settle\"]\n" + small_case());
@@ -193,12 +268,18 @@ TEST_F(Errors, StartFiles) {
   directory.write("text.h5", "no HDF5 file");
   expect_error(words("../text.h5"), {"text.h5", "not a checkpoint of moraine"});
 
-  const fs::path bed = make("bed", "stages = [\"settle\"]\n" + small_case());
-  run(bed, {"stage.settle.duration=0.01"});
-  const std::string whole = contents(checkpoint_of(bed));
-  for (const std::size_t size : {whole.size() / 2, whole.size() - 1}) {
-    directory.write("cut.h5", whole.substr(0, size));
-    expect_error(words("../cut.h5"), {"cut.h5", "truncated"});
+  for (const std::string& text : {graded_case(), small_case()}) {
+    const fs::path bed = make("bed", "stages = [\"settle\"]\n" + text);
+    run(bed, {"stage.settle.duration=0.01"}, {"--force"});
+    const std::string whole = contents(checkpoint_of(bed));
+    for (const std::size_t size : {whole.size() / 2, whole.size() - 1}) {
+      directory.write("cut.h5", whole.substr(0, size));
+      expect_error(words("../cut.h5"), {"cut.h5", "truncated"});
+    }
+    std::string flipped = whole;  // one bit in what it holds
+    flipped[whole.size() / 2] ^= 1;
+    directory.write("flipped.h5", flipped);
+    expect_error(words("../flipped.h5"), {"flipped.h5"});
   }
   expect_error(words("../bed/output/series.h5"), {"series.h5", "not a checkpoint of moraine"});
   EXPECT_FALSE(fs::exists(small / "output"));

@@ -19,10 +19,20 @@ class Restart : public Program {
  protected:
   void SetUp() override {
     const auto began = Clock::now();
-    whole = make("whole", small_case());
+    whole = make("whole", text);
     ASSERT_NO_FATAL_FAILURE(run(whole));
     length = Clock::now() - began;
-    cut = make("cut", small_case());
+    cut = make("cut", text);
+  }
+
+  // Each kill hits a run that has resumed from where the one before had got to.
+  void survive_ten_kills(double longest) {
+    std::mt19937 random(2013);
+    std::uniform_real_distribution<double> share(0.02, longest);
+    int hits = 0;
+    for (int k = 0; k < 10; ++k) hits += run_for(share(random) * length, SIGKILL);
+    EXPECT_GE(hits, 3);
+    finish_and_compare();
   }
 
   // Starts or resumes, and sends the signal after so long. False if the run was over before.
@@ -50,19 +60,17 @@ class Restart : public Program {
       EXPECT_NE(entry.path().extension(), ".tmp") << entry.path();
   }
 
+  std::string text = small_case();
   fs::path whole, cut;
   Seconds length{};
 };
+class GradedRestart : public Restart {
+ protected:
+  GradedRestart() { text = graded_case(); }
+};
 
-// Each kill hits a run that has resumed from where the one before had got to.
-TEST_F(Restart, TenKillsAtRandomMoments) {
-  std::mt19937 random(2013);
-  std::uniform_real_distribution<double> share(0.02, 0.25);
-  int hits = 0;
-  for (int k = 0; k < 10; ++k) hits += run_for(share(random) * length, SIGKILL);
-  EXPECT_GE(hits, 3);
-  finish_and_compare();
-}
+TEST_F(Restart, TenKillsAtRandomMoments) { survive_ten_kills(0.25); }
+TEST_F(GradedRestart, TenKillsAtRandomMoments) { survive_ten_kills(0.25); }
 
 // One kill in each of ten runs, anywhere from start to end.
 TEST_F(Restart, OneKillAnywhere) {
@@ -91,24 +99,26 @@ TEST_F(Restart, KillsInTheFirstMilliseconds) {
 // The collisions of the settling grains, each step taken by an engine that goes on and by one that takes
 // over: lists that are rebuilt at other steps must not show.
 TEST_F(Program, AnyStepMayBeTheFirstAfterARestart) {
-  const fs::path small = make("small", small_case());
-  const cases::Case c = cases::load(small);
-  const run::Start start = run::start_of(c);
-  for (const dem::Backend backend : {dem::Backend::cpu, dem::Backend::reference}) {
-    output::Checkpoint now = start.before;
-    const run::Stage stage = run::prepare(c, 0, start, now);
-    const auto engine = dem::make_engine(backend, 1), other = dem::make_engine(backend, 1);
-    engine->load(stage.scene, now.state);
-    engine->advance(2000);
-    for (int k = 2000; k < 2500; ++k) {
-      other->load(stage.scene, engine->state());
-      engine->advance(1), other->advance(1);
-      const dem::State a = engine->state(), b = other->state();
-      ASSERT_TRUE(a.x == b.x && a.v == b.v && a.omega == b.omega && a.force == b.force &&
-                  a.torque == b.torque)
-          << k;
-      ASSERT_EQ(a.ledger.slip, b.ledger.slip) << "step " << k;
-      ASSERT_EQ(a.ledger.viscous, b.ledger.viscous) << "step " << k;
+  for (const std::string& text : {small_case(), graded_case()}) {
+    const fs::path small = make("small", text);
+    const cases::Case c = cases::load(small);
+    const run::Start start = run::start_of(c);
+    for (const dem::Backend backend : {dem::Backend::cpu, dem::Backend::reference}) {
+      output::Checkpoint now = start.before;
+      const run::Stage stage = run::prepare(c, 0, start, now);
+      const auto engine = dem::make_engine(backend, 1), other = dem::make_engine(backend, 1);
+      engine->load(stage.scene, now.state);
+      engine->advance(2000);
+      for (int k = 2000; k < 2500; ++k) {
+        other->load(stage.scene, engine->state());
+        engine->advance(1), other->advance(1);
+        const dem::State a = engine->state(), b = other->state();
+        ASSERT_TRUE(a.x == b.x && a.v == b.v && a.omega == b.omega && a.force == b.force &&
+                    a.torque == b.torque)
+            << k;
+        ASSERT_EQ(a.ledger.slip, b.ledger.slip) << "step " << k;
+        ASSERT_EQ(a.ledger.viscous, b.ledger.viscous) << "step " << k;
+      }
     }
   }
 }
