@@ -54,7 +54,7 @@ void print_digests(std::int64_t settling, std::int64_t steps) {
                 engine, end.contacts.size());
   };
   const std::vector<NamedBed> beds =
-      named_beds(bed_after(settling), walled_bed_after(settling), make_graded_bed(3));
+      named_beds(bed_after(settling), walled_bed_after(settling), make_graded_bed(9));
   for (const NamedBed& bed : beds) print(bed, "one thread", Backend::cpu, 1);
   print(beds[0], "two threads", Backend::cpu, 2);
   print(beds[0], "the GPU's loop", Backend::reference, 1);
