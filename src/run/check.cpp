@@ -87,11 +87,13 @@ void print_what_would_do(const cases::Case& c, const dem::GradingSummary& sizes,
                             : c.grains.distribution == "lognormal" ? "grains.radius_min, or radius_mean"
                                                                    : "grains.radius_min";
   std::printf(" (%s), or with 100 times softer contacts (model.softening)\n", where.c_str());
-  // Heavier small grains belong here, too, once a case can have them.
   if (total <= a_day) return;
   const double shorten = total / a_day, size = sizes.smallest * std::pow(shorten, 2.0 / 3);
   if (size < sizes.d50)
-    std::printf("                a day in all with none below %.3g m (D50 is %.3g m)", size, sizes.d50);
+    std::printf(
+        "                a day in all with none below %.3g m (D50 is %.3g m); for slow shear with "
+        "model.density_scaling = %.2g",
+        size, sizes.d50, 0.5 * size);
   else
     std::printf("                more than a day even with all at D50, %.3g m", sizes.d50);
   std::printf("; or with model.softening = %.2g\n", c.softening * shorten * shorten);

@@ -114,6 +114,16 @@ TEST_F(Press, AGradedBedReachesItsPorosityWithTheSameBits) {
   expect_same_results(one, two);
 }
 
+// Kinetic energy is that of the mass that answers to forces, also across a jump of the sides.
+TEST_F(Press, DensityScalingKeepsTheAccount) {
+  const fs::path c = make("scaled", graded(0.45));
+  run(c, {"model.density_scaling=0.004"});
+  const output::Row last = output::read_series(series_of(c)).back();
+  EXPECT_NEAR(last.porosity, 0.45, 1e-4);
+  EXPECT_LT(std::abs(last.residue), 0.01 * last.top_wall_work);
+}
+
+
 // Also where the cut falls between two jumps of the sides, or on one.
 TEST_F(Press, ACutStageEndsWithTheBitsOfTheUncutOne) {
   const std::string head = packing(300, 0.3, 0.01);
