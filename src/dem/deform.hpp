@@ -15,12 +15,13 @@ struct BoxStress {
 };
 BoxStress box_stress(const Scene& scene, const State& state);
 
-double box_volume(const Scene& scene);   // m3, of a box that is periodic in all directions
+double box_volume(const Scene& scene);    // m3, of a box that is periodic in all directions
 double solid_volume(const State& state);  // m3, sum of the grains' volumes
 
 // Multiplies sides and places by `factor`, along each axis. Springs follow as they would if the grains had
 // moved there; velocities stay, for they are those against the mean motion. The state is synchronised
-// (engine.hpp): load() finds what touches now and evaluates its forces. For a scene without planes and layers.
+// (engine.hpp): load() finds what touches now and evaluates its forces. For a scene without planes and
+// layers.
 void deform(Scene& scene, State& state, const Vec3d& factor);
 
 // J, of the springs of grain contacts.

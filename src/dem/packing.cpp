@@ -78,7 +78,8 @@ class RandomPlaces {
       for (Index k = low[2]; k <= high[2]; ++k)
         for (Index j = low[1]; j <= high[1]; ++j)
           for (Index i = low[0]; i <= high[0]; ++i)
-            for (const Index g : c.cells[c.index((i + c.n[0]) % c.n[0], (j + c.n[1]) % c.n[1], (k + c.n[2]) % c.n[2])]) {
+            for (const Index g :
+                 c.cells[c.index((i + c.n[0]) % c.n[0], (j + c.n[1]) % c.n[1], (k + c.n[2]) % c.n[2])]) {
               Vec3d d = x - x_[g];
               for (int a = 0; a < 3; ++a)
                 if (periodic_[a]) d[a] -= box_[a] * std::round(d[a] / box_[a]);

@@ -34,10 +34,10 @@ class Guard {
   void check_energy(const dem::State& state);
 
   cases::Guards limits_;
-  const Stage& stage_;  // whose step may change meanwhile
-  output::Row first_;   // of the stage
+  const Stage& stage_;               // whose step may change meanwhile
+  output::Row first_;                // of the stage
   const output::StageStart& start_;  // a press moves what rows count from
-  double most_put_in_ = 0;  // J
+  double most_put_in_ = 0;           // J
 };
 
 // The deepest overlap of a state's contacts, as a fraction of the smaller radius.
