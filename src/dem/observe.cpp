@@ -194,8 +194,7 @@ Observation observe(const Scene& scene, const State& s, const Loads& loads) {
     o.height = std::max(o.height, s.x[i].z + s.r[i]);
   }
   if (has_wall) o.height = s.wall_z();
-  if (scene.periodic_z) o.height = scene.box.z;
-  o.porosity = 1 - volume / (area * o.height);
+  o.porosity = 1 - volume / (area * (scene.periodic_z ? scene.box.z : o.height));
 
   double normal_force = 0;
   for (const ContactForce& c : loads.contacts) {

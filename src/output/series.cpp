@@ -47,7 +47,7 @@ const std::vector<Column>& columns() {
        "force of the grains on the top wall (the floor, where there is none) over the cross-section"},
       {"shear_friction", "1", "shear stress over normal stress"},
       {"height", "m",
-       "height of the bed: the top wall, the highest point of any grain, or a box periodic in z"},
+       "height of the bed: the top wall, the highest point of any grain, or the box where it is pressed"},
       {"dilation", "m", "height gained since the stage began"},
       {"dilation_diameters", "1", "height gained since the stage began, in mean grain diameters"},
       {"porosity", "1", "share of the bed that is not grains"},

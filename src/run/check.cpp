@@ -12,6 +12,7 @@
 #include "run/estimate.hpp"
 #include "run/needs.hpp"
 #include "run/precheck.hpp"
+#include "run/press.hpp"
 #include "run/progress.hpp"
 #include "run/run.hpp"
 #include "run/schedule.hpp"
@@ -184,6 +185,7 @@ void check_case(const Options& options) {
     Estimate::Time time{steps, std::numeric_limits<double>::quiet_NaN()};
     std::string unknown;
     try {
+      if (presses(stage)) throw error("grains that are pressed are loose first and dense in the end");
       time = estimate.stage(k, duration, scene.dt);
       total += time.seconds;
     } catch (const Error& why) {  // of a bed that was made up, which the run may never meet

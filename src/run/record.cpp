@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "dem/deform.hpp"
+#include "run/press.hpp"
 
 namespace moraine::run {
 
@@ -40,8 +41,8 @@ output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, c
   row.shear_stress = o.shear_stress;
   row.normal_stress = o.normal_stress;
   row.shear_friction = o.normal_stress > 0 ? o.shear_stress / o.normal_stress : 0;
-  row.height = o.height;
-  row.dilation = o.height - stage.height_0;
+  row.height = presses(stage) ? stage.scene.box.z : o.height;
+  row.dilation = row.height - stage.height_0;
   row.dilation_diameters = row.dilation / stage.diameter;
   row.porosity = o.porosity;
   row.mean_overlap = o.mean_overlap, row.max_overlap = o.max_overlap;

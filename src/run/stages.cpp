@@ -319,8 +319,7 @@ std::vector<std::string> set_reference(const cases::Case& c, std::size_t index, 
     s.at(BodyId::bottom_layer) = s.at(BodyId::top_layer) = {};
   }
   s.x_start = s.x;
-  const bool whole_box = c.periodic_z && !shears(stage.kind);
-  now.height_0 = whole_box ? box_z : s.wall_z() > 0 ? s.wall_z() : bed_top(s);
+  now.height_0 = stage.kind == Kind::press ? box_z : s.wall_z() > 0 ? s.wall_z() : bed_top(s);
   return warnings;
 }
 

@@ -1,6 +1,7 @@
 // Stages that press a periodic box: the packings that are known, the account of energy, bits, and what a
 // person is told.
 #include "program.hpp"
+#include "run/run.hpp"
 
 namespace moraine {
 namespace {
@@ -56,19 +57,19 @@ class Press : public Program {
     const fs::path c = make("packing", packing(500, mu, duration));
     run(c, {}, {"--threads", "1"});
     const output::Row last = output::read_series(series_of(c)).back();
-    EXPECT_LT(last.unbalanced_force, 0.05);
-    for (const double stress : {last.stress_x, last.stress_y, last.stress_z}) EXPECT_NEAR(stress, 1e4, 300);
+    EXPECT_LT(last.unbalanced_force, 0.1);
+    for (const double stress : {last.stress_x, last.stress_y, last.stress_z}) EXPECT_NEAR(stress, 1e4, 1e3);
     EXPECT_NEAR(1 - last.porosity, solid_fraction, fraction_error);
     EXPECT_NEAR(coordination(output::read_checkpoint(checkpoint_of(c)).state, mu > 0 ? 2 : 4), z, z_error);
   }
 };
 
-// Agnolin & Roux (2007) have 0.639 and 6.0, 0.593 and 4.5 for rigid grains in a box without end.
-// bench/packing extrapolates; 500 grains are looser by 0.0045 without friction, and have 0.09 and 0.13
-// contacts more at 10 kPa. Packings scatter by 0.0021 and 0.0015, and by 0.02 to 0.03 contacts; four times
-// that is allowed.
-TEST_F(Press, FrictionlessSpheresPackAsKnown) { expect_packing(0, 1.4, 0.639 - 0.0045, 0.0085, 6.09, 0.1); }
-TEST_F(Press, SpheresWithFrictionPackAsKnown) { expect_packing(0.3, 0.3, 0.593, 0.0075, 4.63, 0.12); }
+// Agnolin & Roux (2007) have 0.639 and 6.0, 0.593 and 4.5 for rigid grains in a box without end, and so does
+// bench/packing, which extrapolates. Its packings of 500 grains at 10 kPa are looser by 0.0045 without
+// friction, and have 0.05 and 0.13 contacts more; they scatter by 0.0021 and 0.0029, and by 0.09 and 0.04
+// contacts. Three times that is allowed.
+TEST_F(Press, FrictionlessSpheresPackAsKnown) { expect_packing(0, 1.4, 0.639 - 0.0045, 0.0063, 6.05, 0.27); }
+TEST_F(Press, SpheresWithFrictionPackAsKnown) { expect_packing(0.3, 0.3, 0.593, 0.0087, 4.63, 0.12); }
 
 // The work of the sides is pressure times the loss of volume; the account closes.
 TEST_F(Press, TheWorkOfTheSides) {
@@ -153,6 +154,19 @@ TEST_F(Press, ACutStageEndsWithTheBitsOfTheUncutOne) {
     EXPECT_EQ(output::read_checkpoint(checkpoint_of(whole)).scene.box,
               output::read_checkpoint(checkpoint_of(cut)).scene.box);
   }
+}
+
+// The loop of the GPU, on the host, ends with the bits of the CPU's.
+TEST_F(Press, BothEnginesHaveTheSameBits) {
+  std::vector<fs::path> both;
+  for (const dem::Backend backend : {dem::Backend::cpu, dem::Backend::reference}) {
+    const fs::path c = make("engine" + std::to_string(both.size()), packing(150, 0.3, 0.04));
+    run::Options options;
+    options.directory = c, options.backend = backend, options.threads = 1, options.quiet = true;
+    run::run_one(options, cases::load(c, {{"stage.gas.strain_rate", "3"}}));
+    both.push_back(c);
+  }
+  expect_same_results(both[0], both[1]);
 }
 
 // Under a wall: a uniaxial stage that ends at a porosity.
