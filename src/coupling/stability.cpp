@@ -27,11 +27,6 @@ std::vector<double> first_guess(const fluid::Grid& grid) {
   return p;
 }
 
-// kg, of a grain of this volume, m3.
-double inertial_mass(const dem::Scene& scene, double volume) {
-  return std::max(scene.density * volume, dem::sphere_mass(scene.density, scene.least_inertia));
-}
-
 // Largest w^2 of grains (and an impermeable wall) on the stiffness of undrained water, by power iteration on
 // M^-1 B^T D^T C^-1 D B, from above by its last change.
 double water_frequency(const Skeleton& skeleton, const Water& water, const std::vector<double>& storage,
@@ -58,7 +53,8 @@ double water_frequency(const Skeleton& skeleton, const Water& water, const std::
     for (double& v : p) v /= norm;
     find_thrust(skeleton, sides, Closure::full, 0, p, thrust);
     for (dem::Index c = 0; c < mapping.chunks(); ++c) mapping.push(c, thrust.to_push, force.data());
-    for (std::size_t i = 0; i < d.size(); ++i) d[i] = (1 / inertial_mass(scene, volume[i])) * force[i].f;
+    for (std::size_t i = 0; i < d.size(); ++i)
+      d[i] = (1 / scene.inertial_mass_of_volume(volume[i])) * force[i].f;
     mapping.apply(d, u);
     if (water.top == TopSide::impermeable) {
       const double a = wall_mass > 0 ? mean_below_top(grid, p) * scene.area() / wall_mass : 0;

@@ -51,7 +51,9 @@ struct Scene {
     return part_of != BodyId::none && body(part_of).is_held(2);
   }
 
-  MORAINE_HD double inertial_mass(double r) const;  // kg; more than the weight tells, by density scaling
+  // kg; more than the weight tells, by density scaling. The second of a grain of this volume, m3.
+  MORAINE_HD double inertial_mass(double r) const;
+  double inertial_mass_of_volume(double volume) const;
 
   MORAINE_HD double area() const { return box.x * box.y; }  // m2
   MORAINE_HD double submerged_gravity() const {
@@ -83,6 +85,10 @@ MORAINE_HD double sphere_mass(double density, double r) { return density * spher
 
 MORAINE_HD double Scene::inertial_mass(double r) const {
   return sphere_mass(density, r < least_inertia ? least_inertia : r);
+}
+inline double Scene::inertial_mass_of_volume(double volume) const {
+  const double least = sphere_volume(least_inertia);
+  return density * (volume < least ? least : volume);
 }
 
 }  // namespace moraine::dem

@@ -201,6 +201,7 @@ template <>
 constexpr std::tuple members<Checkpoint>{
     Member{"case_text", &Checkpoint::case_text},
     Member{"version", &Checkpoint::version},
+    Member{"inputs", &Checkpoint::inputs},
     Member{"stage", &Checkpoint::stage},
     Member{"start", &Checkpoint::start},
     Member{"height_0", &Checkpoint::height_0},

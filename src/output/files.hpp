@@ -128,6 +128,7 @@ void write_xdmf(const std::filesystem::path& directory, const std::vector<Snapsh
 struct Checkpoint {
   std::string case_text;  // resolved case
   std::string version;
+  std::string inputs;      // files besides the case, with their digests
   std::int64_t stage = 0;  // index
   StageStart start;        // of the stage
   double height_0 = 0;     // m, H_0: of the bed when the stage, or the shear that it carries on, began

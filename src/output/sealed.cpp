@@ -69,6 +69,13 @@ class Reader {
 
 }  // namespace
 
+std::string digest_of_file(const std::filesystem::path& path) {
+  const Reader file(path);
+  std::string bytes;
+  file.append_to(bytes, file.size());
+  return digest_of(bytes);
+}
+
 void seal(std::string& bytes, const std::string& kind, std::int64_t format) {
   std::string rest = kind + " " + std::to_string(format) + "\nbytes " + std::to_string(bytes.size()) + "\n";
   rest.resize(seal_size - first_line, '\n');

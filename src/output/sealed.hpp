@@ -29,6 +29,9 @@ struct Sealed {
   std::int64_t format = 0;
   std::string bytes;  // without a seal the first of them only
 };
+// SHA-256 of a file's bytes. Throws Error where it cannot be read.
+std::string digest_of_file(const std::filesystem::path& path);
+
 // As the first lines say, unproved; none where the file has no seal or cannot be read.
 std::string kind_of(const std::filesystem::path& path);
 // Throws Damaged, or Error where the file cannot be opened.

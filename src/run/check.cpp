@@ -115,9 +115,13 @@ void check_case(const Options& options) {
   const double settled = volume / 0.6 / area;  // m, at a porosity of 0.4
 
   std::printf("%s\n", c.title.empty() ? c.directory.string().c_str() : c.title.c_str());
-  std::printf(
-      "  grains        %.0f, mean diameter %.4g m, box %.4g x %.4g m, bed about %.3g m (porosity 0.4)\n", n,
-      diameter, start.box_x, start.box_y, settled);
+  if (c.periodic_z)
+    std::printf("  grains        %.0f, mean diameter %.4g m, box %.4g x %.4g x %.4g m, porosity %.3g\n", n,
+                diameter, start.box_x, start.box_y, start.box_z, 1 - volume / (area * start.box_z));
+  else
+    std::printf(
+        "  grains        %.0f, mean diameter %.4g m, box %.4g x %.4g m, bed about %.3g m (porosity 0.4)\n", n,
+        diameter, start.box_x, start.box_y, settled);
   const dem::GradingSummary sizes = dem::summary_of(state.r);
   if (sizes.largest > 1.5 * sizes.smallest)
     std::printf(
@@ -185,7 +189,9 @@ void check_case(const Options& options) {
     Estimate::Time time{steps, std::numeric_limits<double>::quiet_NaN()};
     std::string unknown;
     try {
-      if (presses(stage)) throw error("grains that are pressed are loose first and dense in the end");
+      const bool squeezed = k == 0 && c.start.empty() && wanted.kind == cases::Stage::Kind::uniaxial;
+      if (presses(stage) || squeezed)
+        throw error("grains that are pressed are loose first and dense in the end");
       time = estimate.stage(k, duration, scene.dt);
       total += time.seconds;
     } catch (const Error& why) {  // of a bed that was made up, which the run may never meet
@@ -234,9 +240,8 @@ void check_case(const Options& options) {
     std::printf("  all           not known\n");
   if (estimate.of_one_size())
     std::printf(
-        "                but of grains of one size: 1:%.0f make no bed in a moment; moraine bench times "
-        "steps of "
-        "one that has settled\n",
+        "                timed with as many grains of one size, as sizes of 1:%.3g make no bed in a moment: "
+        "expect more\n",
         sizes.largest / sizes.smallest);
   if (c.dt == 0 && (total > long_run || shortest < short_step)) print_what_would_do(c, sizes, total);
   for (const std::string& w : warnings) std::printf("  warning: %s\n", w.c_str());

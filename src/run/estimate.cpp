@@ -208,6 +208,7 @@ Estimate::Time Estimate::stage(std::size_t index, double duration, double dt) {
   dem::State bed = loose_ ? with_contacts(expected_contacts(wanted)) : packed_;
   output::Checkpoint now = start_.before;
   if (index > 0) take_layers_away(now.scene);  // with layers of its own
+  if (index > 0) now.scene.box = {start_.box_x, start_.box_y, start_.box_z};
   now.state = std::move(bed);
   Stage stage = prepare(case_, index, start_, now);
   bed = std::move(now.state);

@@ -111,10 +111,9 @@ void Guard::check(const dem::State& s) {
         "; expected at most guards.max_overlap = ", limits_.max_overlap,
         stage_.porosity > 0
             ? text(": ", stage_.name, " has pressed the grains to a porosity of ",
-                   dem::observe(stage_.scene, s).porosity, ", on the way to ", stage_.porosity,
-                   ", which these grains may not reach (equal spheres come to 0.36 without friction); "
-                   "expected "
-                   "a larger porosity, less friction, or a smaller strain_rate")
+                   dem::observe(stage_.scene, s).porosity, "; they may not bear that of ", stage_.porosity,
+                   " (equal spheres come to 0.36 without friction); expected a larger porosity, less "
+                   "friction, or a smaller strain_rate")
             : ": the load or the impact is too much for contact.k_n, or the step is too long (try a smaller "
               "model.f)");
   check_energy(s);

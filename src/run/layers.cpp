@@ -109,9 +109,15 @@ std::vector<std::string> take_layers(const cases::Stage& stage, const std::vecto
                   needed == dem::BodyId::none ? "free" : "top_layer", "; expected some to ",
                   needed == dem::BodyId::none ? "deform" : "be driven",
                   ", or no roles: then the layers go by height");
-  if (stage.bottom_layer < 0 && stage.top_layer < 0) return {};
-  return {"stage " + stage.name +
-          ": bottom_layer and top_layer do not count: the layers are the roles that the grains came with"};
+  std::vector<std::string> warnings;
+  if (std::ranges::find(roles, dem::BodyId::bottom_layer) == roles.end())
+    warnings.push_back("stage " + stage.name +
+                       ": no grain of the start has the role bottom_layer: the bed may slide on the floor");
+  if (stage.bottom_layer >= 0 || stage.top_layer >= 0)
+    warnings.push_back(
+        "stage " + stage.name +
+        ": bottom_layer and top_layer do not count: the layers are the roles that the grains came with");
+  return warnings;
 }
 
 std::vector<std::string> foresee_layers(const cases::Stage& stage, const dem::State& s, double area) {

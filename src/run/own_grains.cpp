@@ -13,6 +13,9 @@ namespace moraine::run {
 
 namespace {
 
+// That shear carries a grain across a periodic side before it is written; farther off are other units.
+constexpr double most_sides = 100;
+
 void expect_inside(const cases::Case& c, const OwnGrains& own) {
   const dem::State& s = own.state;
   const double side[3] = {own.box_x, own.box_y, own.box_z};
@@ -20,6 +23,12 @@ void expect_inside(const cases::Case& c, const OwnGrains& own) {
   const bool walls[3] = {c.walls_x, c.walls_y, c.floor};
   for (dem::Index i = 0; i < s.size(); ++i)
     for (int a = 0; a < 3; ++a) {
+      if (!walls[a] && side[a] > 0) {
+        const double slack = periodic[a] ? most_sides * side[a] : 0;
+        if ((a < 2 || periodic[a]) && !(s.x[i][a] >= -slack && s.x[i][a] <= side[a] + slack))
+          throw error(own.at(i), ": the grain at ", "xyz"[a], " = ", s.x[i][a],
+                      " m lies outside the box; expected 0 to box.", "xyz"[a], " = ", side[a], " m");
+      }
       if (periodic[a] || !walls[a]) continue;
       const double deepest = c.guards.max_overlap * s.r[i];
       const double below = s.r[i] - s.x[i][a], above = a < 2 ? s.x[i][a] + s.r[i] - side[a] : below;
@@ -51,6 +60,16 @@ void expect_apart(const cases::Case& c, const OwnGrains& own) {
 
 std::string OwnGrains::at(dem::Index i) const {
   return lines.empty() ? text(file.string(), ", grain ", i) : text(file.string(), ", line ", lines[i]);
+}
+
+void expect_same_sides(const cases::Case& c, const dem::Vec3d& box, const std::array<bool, 3>& periodic) {
+  const dem::Vec3d given{c.box_x, c.box_y, c.box_z};
+  const bool in_case[3] = {c.periodic_x, c.periodic_y, c.periodic_z};
+  for (int a = 0; a < 3; ++a)
+    if (in_case[a] && periodic[a] && box[a] > 0 && given[a] > 0 &&
+        std::abs(given[a] - box[a]) > 1e-9 * box[a])
+      throw error(c.start.string(), ": its grains fill a box of ", box[a], " m along ", "xyz"[a],
+                  ", not of box.", "xyz"[a], " = ", given[a], " m; expected 0, to take that of `start`");
 }
 
 bool has_own_grains(const std::filesystem::path& start) {

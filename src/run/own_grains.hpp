@@ -1,6 +1,7 @@
 // Grains that a case begins with and that were not drawn: from a table (grain_table.hpp) a data file of
 // LAMMPS (lammps_data.hpp) or a snapshot (snapshot_grains.hpp).
 #pragma once
+#include <array>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -22,6 +23,10 @@ struct OwnGrains {
 };
 
 // Whether `start` holds grains rather than the end of a case.
+// Grains across a periodic side have images in that box alone. Throws Error where the case gives another
+// side. box: m, found with the grains, 0: none; periodic: there.
+void expect_same_sides(const cases::Case& c, const dem::Vec3d& box, const std::array<bool, 3>& periodic);
+
 bool has_own_grains(const std::filesystem::path& start);
 
 // Reads them. Roles that are all free count as none. Throws Error with the line of the file where a grain has

@@ -6,8 +6,10 @@
 #include "dem/scene_check.hpp"
 #include "error.hpp"
 #include "memory.hpp"
+#include "output/files.hpp"
 #include "run/guard.hpp"
 #include "run/needs.hpp"
+#include "run/own_grains.hpp"
 
 namespace moraine::run {
 
@@ -160,9 +162,17 @@ void check_room(const cases::Case& c, const Stage& stage, const dem::State& s) {
       "cells_z");
 }
 
-void check_overlaps(const cases::Case& c, const dem::Scene& scene, const dem::State& s) {
+constexpr double usual_overlap = 0.01;  // of the smaller radius, at most, of grains that lie
+
+void check_overlaps(const cases::Case& c, const dem::Scene& scene, const dem::State& s,
+                    std::vector<std::string>& warnings) {
   const Overlap o = deepest_overlap(scene, s);
-  if (o.fraction <= c.guards.max_overlap) return;
+  if (o.fraction <= c.guards.max_overlap) {
+    if (has_own_grains(c.start) && o.fraction > usual_overlap)
+      warnings.push_back(text(c.start.string(), ": grain ", s.id[o.i], " at ", dem::triple(s.x[o.i]), " m ",
+                              describe(o, s), ", more than grains that lie: they may fly apart"));
+    return;
+  }
   const bool at_side_wall = o.j < 0 && scene.body(o.wall).axis < 2;
   throw error(c.start.empty() ? c.directory.string() : c.start.string(), ": grain ", s.id[o.i], " at ",
               dem::triple(s.x[o.i]), " m ", describe(o, s),
@@ -171,10 +181,57 @@ void check_overlaps(const cases::Case& c, const dem::Scene& scene, const dem::St
                            : ": check radii, positions and box of the start");
 }
 
+// What a table says of motion counts only where the first stage keeps it.
+void check_motion(const cases::Case& c, const Start& start, std::vector<std::string>& warnings) {
+  if (!has_own_grains(c.start) || output::is_snapshot(c.start) || c.stages.empty()) return;
+  if (!c.stages[0].zero_kinematics) return;
+  double fastest = 0;
+  for (const dem::Vec3d& v : start.before.state.v) fastest = std::max(fastest, std::sqrt(dot(v, v)));
+  if (fastest > 0)
+    warnings.push_back(text(c.start.string(), " has velocities, of up to ", fastest, " m/s, and stage ",
+                            c.stages[0].name, " begins at rest; zero_kinematics = false keeps them"));
+}
+
+void check_scaling(const cases::Case& c, const Start& start, std::vector<std::string>& warnings) {
+  if (c.density_scaling == 0) return;
+  const auto [smallest, largest] = std::ranges::minmax_element(start.before.state.r);
+  if (c.density_scaling > *largest)
+    throw error("model.density_scaling = ", c.density_scaling, " m: wider than the largest radius, ",
+                *largest, " m; expected a radius between the smallest, ", *smallest, " m, and that");
+  if (c.density_scaling <= *smallest) {
+    warnings.push_back(text("model.density_scaling = ", c.density_scaling,
+                            " m does nothing: no radius is smaller than that (the smallest is ", *smallest,
+                            " m)"));
+    return;
+  }
+  for (const cases::Stage& stage : c.stages)
+    if (stage.kind == cases::Stage::Kind::settle && c.gravity > 0)
+      warnings.push_back(text("stage ", stage.name,
+                              ": by model.density_scaling the smallest grains fall with ",
+                              std::pow(*smallest / c.density_scaling, 3),
+                              " of gravity and may still fall at its end; press the bed together instead"));
+}
+
+// Of presses one after the other.
+void check_porosities(const cases::Case& c) {
+  double before = 1;
+  for (const cases::Stage& stage : c.stages) {
+    const bool presses = stage.kind == cases::Stage::Kind::press;
+    if (presses && stage.porosity > 0 && stage.porosity >= before)
+      throw error("stage ", stage.name, ": porosity = ", stage.porosity,
+                  ", where a stage before it presses to ", before,
+                  "; expected less than that (to press does not loosen)");
+    before = presses && stage.porosity > 0 ? stage.porosity : 1;
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> precheck(const cases::Case& c, const Start& start, dem::Engine& engine) {
   std::vector<std::string> warnings;
+  check_motion(c, start, warnings);
+  check_scaling(c, start, warnings);
+  check_porosities(c);
   for (std::size_t k = 0; k < c.stages.size(); ++k) {
     output::Checkpoint now = foreseen(c, k, start);
     Stage stage = prepare(c, k, start, now);
@@ -200,7 +257,7 @@ std::vector<std::string> precheck(const cases::Case& c, const Start& start, dem:
                               "box.y, fluid.height)"));
     if (k > 0) continue;
     engine.load(stage.scene, s, water.get());
-    check_overlaps(c, stage.scene, engine.state());
+    check_overlaps(c, stage.scene, engine.state(), warnings);
   }
   return warnings;
 }

@@ -14,7 +14,9 @@ namespace {
 // loose grains and the swings after a jump are averaged over some ten jumps.
 constexpr double gain = 0.5;
 
-// To the wanted porosity at an even rate; all in the last jump but one, so that the end comes as asked for.
+constexpr double most_at_once = 0.01;  // of a side, in a jump
+
+// To the wanted porosity at an even rate; the last jump goes all the way.
 dem::Vec3d to_porosity(const Stage& stage, const dem::State& s, double ahead) {
   const double left = stage.end - stage.scene.time(s.step);
   const double share = left < 2 * ahead ? 1 : ahead / left;
@@ -67,7 +69,16 @@ double squeezing_time(const std::string& stage, const dem::Scene& scene, const d
   return (s.wall_z() - solid / (1 - porosity)) / (strain_rate * height_0);
 }
 
+void expect_small_jumps(const Stage& stage) {
+  const double ahead = steps_between_presses * stage.scene.dt;
+  if (stage.strain_rate * ahead > most_at_once)
+    throw error("stage ", stage.name, ": strain_rate = ", stage.strain_rate, " 1/s shortens each side by ",
+                stage.strain_rate * ahead, " of it in one jump, of ", steps_between_presses, " steps of ",
+                stage.scene.dt, " s; expected at most ", most_at_once / ahead, " 1/s");
+}
+
 dem::Vec3d next_press(const Stage& stage, const dem::State& s) {
+  expect_small_jumps(stage);
   const double ahead = steps_between_presses * stage.scene.dt;
   return stage.porosity > 0 ? to_porosity(stage, s, ahead) : to_pressure(stage, s, ahead);
 }

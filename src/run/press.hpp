@@ -19,6 +19,9 @@ double pressing_time(const std::string& stage, const dem::Scene& scene, const de
 double squeezing_time(const std::string& stage, const dem::Scene& scene, const dem::State& state,
                       double height_0, double porosity, double strain_rate);
 
+// Throws Error naming the stage where a side would shorten by too much in one jump.
+void expect_small_jumps(const Stage& stage);
+
 // What the sides are to be multiplied by now, for the steps up to the next jump.
 dem::Vec3d next_press(const Stage& stage, const dem::State& state);
 

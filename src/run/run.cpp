@@ -140,6 +140,10 @@ class Runner {
     if (!refused.empty())
       throw error(checkpoint.string(), ": belongs to another version of this case: ", refused,
                   "; undo the change, or use --force to run anew");
+    if (now_.inputs != start_.inputs)
+      throw error(checkpoint.string(), ": the run began with another ",
+                  (case_.start.empty() ? case_.grains.sieves : case_.start).string(),
+                  ", which has changed since; undo the change, or use --force to run anew");
     const auto stages = static_cast<std::int64_t>(case_.stages.size());
     if (now_.stage < 0 || now_.stage >= stages || now_.rows.empty())
       throw error(checkpoint.string(), ": stands in stage ", now_.stage, " of ", stages,
@@ -163,7 +167,7 @@ class Runner {
 
   void run_stages(bool resuming) {
     if (!resuming) now_ = start_.before;
-    now_.case_text = case_.resolved;
+    now_.case_text = case_.resolved, now_.inputs = start_.inputs;
     if (resuming) remove_later_snapshots(), all_listed_ = false;  // lists lag behind the snapshots
     now_.version = MORAINE_VERSION;
     const std::string header = "# moraine " MORAINE_VERSION ", " + engine_->describe() + ", seed " +
@@ -252,6 +256,7 @@ class Runner {
       progress_->show({done, stage.time(step), now_.rows.back().unbalanced_force});
       if (water_ && (due || step == look)) say_outside(ended);
       if (ended && water_) progress_->say("water, " + water_->solver());
+      if (ended && stage.pressure > 0) say_stress(stage);
       const bool stop = stop_requested;
       if (stop || ended || seconds_since(saved_) > case_.output.checkpoint_interval) {
         if (!due) take_state();
@@ -260,6 +265,19 @@ class Runner {
       if (stop)
         throw error("interrupted at step ", done, " of stage ", stage.name, "; --resume goes on from here");
     }
+  }
+
+  // Of a press that has not come to its pressure.
+  void say_stress(const Stage& stage) {
+    const output::Row& row = now_.rows.back();
+    for (const double stress : {row.stress_x, row.stress_y, row.stress_z})
+      if (std::abs(stress - stage.pressure) > 0.05 * stage.pressure) {
+        progress_->say(text("warning: stage ", stage.name, " ends with ", row.stress_x, ", ", row.stress_y,
+                            " and ", row.stress_z,
+                            " Pa along x, y and z, not with pressure = ", stage.pressure,
+                            " Pa; a longer duration or a larger strain_rate would get nearer"));
+        return;
+      }
   }
 
   void warn(const std::string& words) {

@@ -15,6 +15,7 @@ OwnGrains read_snapshot_grains(const cases::Case& c) {
     throw error(e.what(), "; expected an undamaged copy, or another snapshot");
   }
   if (snapshot.r.empty()) throw error(c.start.string(), ": has no grains");
+  expect_same_sides(c, snapshot.box, {true, true, true});  // what was periodic there it does not say
   const auto side = [](double wanted, double found) { return wanted > 0 ? wanted : found; };
   OwnGrains own{c.start,
                 dem::grains_at_rest(std::move(snapshot.r), std::move(snapshot.x)),

@@ -88,19 +88,15 @@ output::Checkpoint read_start(const std::filesystem::path& path) {
   } catch (const output::Damaged& e) {
     throw error(
         e.what(),
-        "; expected an undamaged copy, or run the case it comes from again: --resume does that from its "
-        "checkpoint before");
+        "; expected the checkpoint of a finished case, a snapshot, a table NAME.csv or a LAMMPS data file "
+        "NAME.data. A checkpoint that is damaged comes anew where its case is run again; --resume does that "
+        "from the one before");
   }
 }
 
-// A press has changed the sides that the case was given.
-void expect_same_box(const cases::Case& c, const dem::Scene& scene) {
-  const dem::Vec3d given{c.box_x, c.box_y, c.box_z};
-  if (!scene.is_periodic() || !c.periodic_z) return;
-  for (int a = 0; a < 3; ++a)
-    if (given[a] > 0 && std::abs(given[a] - scene.box[a]) > 1e-9 * scene.box[a])
-      throw error(c.start.string(), ": its grains fill a box of ", scene.box[a], " m along ", "xyz"[a],
-                  ", not of box.", "xyz"[a], " = ", given[a], " m; expected 0, to take that of `start`");
+// A file that the grains come from, as it is now.
+std::string input(const std::filesystem::path& file) {
+  return file.filename().string() + " " + output::digest_of_file(file);
 }
 
 }  // namespace
@@ -151,6 +147,7 @@ Start start_of(const cases::Case& c) {
     OwnGrains own = read_own_grains(c);
     Start s{{}, own.box_x, own.box_y, own.box_z, 0};
     s.before.state = std::move(own.state), s.roles = std::move(own.roles), s.note = std::move(own.note);
+    s.inputs = input(c.start);
     double volume = 0;
     for (const double r : s.before.state.r) volume += r * r * r;
     const double n = s.before.state.size();
@@ -165,7 +162,7 @@ Start start_of(const cases::Case& c) {
     s.before.rows.clear(), s.before.snapshots.clear();
     s.before.stage = 0, s.before.start.time = 0, s.before.finished = false;
     const dem::Scene& scene = s.before.scene;
-    expect_same_box(c, scene);
+    expect_same_sides(c, scene.box, {scene.periodic_x, scene.periodic_y, scene.periodic_z});
     if (s.box_x <= 0) s.box_x = scene.box.x;
     if (s.box_y <= 0) s.box_y = scene.box.y;
     if (s.box_z <= 0) s.box_z = scene.box.z;
@@ -202,6 +199,7 @@ Start start_of(const cases::Case& c) {
           loose.box_z > 0 ? loose.box_z : c.box_z,
           default_wall_mass(c, loose.state.size(), loose.cell)};
   s.before.state = std::move(loose.state);
+  if (g.distribution == "sieves") s.inputs = input(g.sieves);
   return s;
 }
 
@@ -390,6 +388,7 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, outpu
   Stage out = describe(c, index, now);
   out.goes_on = false, out.warnings = warnings;
   if (c.automatic_dt) fit_step(out, s, scene.dt), now.scene = out.scene;
+  if (presses(out)) expect_small_jumps(out);
   return out;
 }
 

@@ -21,6 +21,7 @@ struct Start {
   double wall_mass;                  // kg
   std::vector<dem::BodyId> roles{};  // by id: the layers of stages that shear; empty: by height
   std::string note{};                // for the log, about the grains
+  std::string inputs{};              // files that the grains come from, with their digests
 };
 // Draws the grains, or reads them from case.start.
 Start start_of(const cases::Case& c);

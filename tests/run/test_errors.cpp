@@ -233,7 +233,7 @@ TEST_F(Gradings, WhoseSmallestGrainsTakeTooLong) {
   const std::string fractal = "distribution = \"fractal\"\nradius_max = 0.01\n";
   const std::string tiny = said("tiny", fractal + "radius_min = 1e-5\n");
   expect(tiny, {"step        7.26", "e-12 s", " steps for 1 s", "\n    time        about ", " d ",
-                "ms a step", "of grains of one size: 1:1",
+                "ms a step", "timed with as many grains of one size, as sizes of 1:11 ",
                 "the smallest grain, 2e-05 m wide, and k_n = 1.16e+09 N/m set the step",
                 "a tenth of the time with 4.6 times larger ones (grains.radius_min)", "(model.softening)",
                 "a day in all with none below ", "; or with model.softening = "});

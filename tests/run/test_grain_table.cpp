@@ -44,6 +44,44 @@ TEST_F(GrainTable, VelocitiesCountWhereTheStageKeepsThem) {
   EXPECT_NEAR(output::read_checkpoint(c / "output/checkpoint.h5").state.x[0].x, 0.02 + 0.5 * 0.01, 2e-5);
 }
 
+TEST_F(GrainTable, SaysWhatIsLostOrStrange) {
+  const std::string head = "x,y,z,r,vx\n0.02,0.03,0.005,0.005,0.5\n";
+  const auto said = [&](const std::string& name, const std::string& table) {
+    return moraine({"check", with_table(name, table).string()}).out;
+  };
+  EXPECT_NE(said("moving", head).find("has velocities, of up to 0.5 m/s, and stage fall begins at rest"),
+            std::string::npos);
+  EXPECT_NE(said("deep", "x,y,z,r\n0.02,0.03,0.02,0.005\n0.0295,0.03,0.02,0.005\n")
+                .find("more than grains that lie: they may fly apart"),
+            std::string::npos);
+  EXPECT_EQ(said("still", "x,y,z,r\n0.02,0.03,0.02,0.005\n").find("warning"), std::string::npos);
+}
+
+// A run that goes on must be of the grains that it began with.
+TEST_F(GrainTable, MustStayAsItWas) {
+  const std::string table = "x,y,z,r\n0.02,0.03,0.02,0.005\n";
+  const fs::path c = with_table("c", table);
+  ASSERT_NO_FATAL_FAILURE(run(c));
+  directory.write("c/grains.csv", table + "0.06,0.03,0.02,0.005\n");
+  std::vector<std::string> words = to_run(c);
+  words.push_back("--resume");
+  expect_error(words, {"the run began with another ", "grains.csv, which has changed since"});
+  directory.write("c/grains.csv", table);
+  EXPECT_EQ(moraine(words).status, 0);
+}
+
+TEST_F(GrainTable, DensityScalingIsBetweenTheSizes) {
+  const fs::path c = with_table("c", "x,y,z,r\n0.02,0.03,0.02,0.005\n0.06,0.03,0.02,0.004\n");
+  const auto scaled = [&](const char* radius) {
+    return std::vector<std::string>{"check", c.string(), "--set",
+                                    std::string("model.density_scaling=") + radius};
+  };
+  expect_error(scaled("6 mm"), {"model.density_scaling = 0.006 m", "wider than the largest radius, 0.005 m"});
+  EXPECT_NE(moraine(scaled("3 mm")).out.find("does nothing: no radius is smaller"), std::string::npos);
+  EXPECT_NE(moraine(scaled("4.5 mm")).out.find("may still fall at its end; press the bed together"),
+            std::string::npos);
+}
+
 // Its time is judged with grains that move as fast as they do.
 TEST_F(GrainTable, FastGrainsAreTimed) {
   const fs::path c = with_table("c", "x,y,z,r,vz\n0.02,0.03,0.01,0.005,-5\n0.06,0.03,0.05,0.005,-20\n");
@@ -67,6 +105,10 @@ TEST_F(GrainTable, SaysWhichRowIsWrong) {
   expect("below", head + "0.05,0.05,0.001,0.005\n", {"line 3", "z = 0.001 m", "beyond the floor"});
   expect("wall", "x,y,z,r\n0.098,0.03,0.02,0.005\n", {"line 2", "x = 0.098 m", "beyond a side wall"},
          "periodic = \"y\"\nwalls = \"x\"\n");
+  expect("metres", "x,y,z,r\n20,0.03,0.02,0.005\n",
+         {"grains.csv, line 2", "x = 20 m lies outside the box; expected 0 to box.x = 0.1 m"});
+  expect("open", head + "0.05,-0.01,0.02,0.005\n", {"line 3", "y = -0.01 m lies outside the box"},
+         "periodic = \"x\"\n");
   expect("column", "x,y,z,radius\n1,1,1,1\n", {"unknown column radius"});
   expect("missing", "x,y,z\n1,1,1\n", {"there is no column r; it has x, y, z"});
   expect("unit", "x (s),y,z,r\n1,1,1,1\n", {"x (s)", "wrong dimension"});
@@ -143,7 +185,7 @@ gamma_n = 1
 )");
   const std::string said = moraine({"check", c.string()}).out;
   EXPECT_NE(said.find("sizes         0.006"), std::string::npos) << said;
-  EXPECT_NE(said.find("of grains of one size: 1:6 make no bed in a moment; moraine bench times steps"),
+  EXPECT_NE(said.find("timed with as many grains of one size, as sizes of 1:5.88 make no bed in a moment"),
             std::string::npos)
       << said;
   EXPECT_EQ(said.find("shorter"), std::string::npos) << said;  // some minutes

@@ -124,7 +124,6 @@ TEST_F(Press, DensityScalingKeepsTheAccount) {
   EXPECT_LT(std::abs(last.residue), 0.01 * last.top_wall_work);
 }
 
-
 // Also where the cut falls between two jumps of the sides, or on one.
 TEST_F(Press, ACutStageEndsWithTheBitsOfTheUncutOne) {
   const std::string head = packing(300, 0.3, 0.01);
@@ -196,6 +195,14 @@ TEST_F(Press, TheNextCaseHasTheBoxOfTheEnd) {
   expect_error(to_run(make("third", next), {"box.x=0.3"}), {"first", "box.x = 0.3", "expected 0"});
 }
 
+TEST_F(Press, SaysThatThePressureIsNotReached) {
+  const fs::path c = make("press", packing(300, 0, 0.01));
+  run(c);
+  const std::string log = contents(c / "output/log.txt");
+  EXPECT_NE(log.find("warning: stage press ends with "), std::string::npos) << log;
+  EXPECT_NE(log.find(" Pa along x, y and z, not with pressure = 10000 Pa"), std::string::npos) << log;
+}
+
 TEST_F(Press, Errors) {
   const fs::path c = make("press", packing(300, 0, 0.1));
   const auto expect = [&](const std::vector<std::string>& overrides, const std::vector<std::string>& words) {
@@ -214,8 +221,13 @@ TEST_F(Press, Errors) {
   expect({"stage.gas.porosity=0.8"}, {"stage gas: porosity = 0.8", "0.75 already", "does not loosen"});
   expect({"grains.count=5", "stage.gas.porosity=0.5"},
          {"stage gas: at porosity = 0.5", "too narrow", "more grains"});
-  expect({"stage.gas.porosity=0.2", "stage.gas.strain_rate=10"},
-         {"guards.max_overlap", "gas has pressed the grains to a porosity of 0.", "on the way to 0.2"});
+  expect(
+      {"stage.gas.porosity=0.2", "stage.gas.strain_rate=10"},
+      {"guards.max_overlap", "gas has pressed the grains to a porosity of 0.", "may not bear that of 0.2"});
+  expect({"stage.gas.strain_rate=1e4"},
+         {"stage gas: strain_rate = 10000 1/s shortens each side by", "in one jump", "expected at most"});
+  expect({"stage.press.pressure=0", "stage.press.duration=0", "stage.press.porosity=0.6"},
+         {"stage press: porosity = 0.6, where a stage before it presses to 0.55"});
 }
 
 }  // namespace

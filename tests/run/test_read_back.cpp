@@ -144,6 +144,12 @@ TEST_F(ReadBack, ASnapshotHasBoxAndTopWall) {
   EXPECT_EQ(start.before.state.wall_z(), end.state.wall_z());
   EXPECT_EQ(start.before.state.contacts.size(), end.state.contacts.size());
   EXPECT_TRUE(start.roles.empty());
+  // In a wider box grains would lose their neighbours across its sides.
+  expect_error({"check", c.string(), "--set", "box.x=0.3"},
+               {"its grains fill a box of ", "not of box.x = 0.3 m"});
+  const fs::path from_end = make("end", "start = \"../bed\"\nstages = [\"consolidate\"]\n" + small_case());
+  expect_error({"check", from_end.string(), "--set", "box.y=0.3"},
+               {"its grains fill a box of ", "not of box.y = 0.3 m"});
 }
 
 TEST_F(ReadBack, ADamagedSnapshotIsNamed) {

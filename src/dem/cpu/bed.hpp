@@ -70,6 +70,7 @@ struct alignas(64) Chunk {
   Index first_link = 0;           // its own links are this one and the next ones,
   std::vector<Outgoing> outgoing;
   std::map<Index, std::vector<GrainPair>> found;        // by its search, by the chunk of i
+  std::vector<Index> finders;                           // chunks that have found pairs of this one
   std::array<std::vector<Index>, most_servos> members;  // its grains in each servo's layer
   Index lost = -1;                                      // a grain that went wrong
 

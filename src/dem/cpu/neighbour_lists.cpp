@@ -63,9 +63,8 @@ void find_pairs(const Bed& bed, Chunk& chunk, const CloseGrains& grains) {
 std::vector<GrainPair> sorted_pairs(const Bed& bed, const Chunk& chunk) {
   std::vector<std::size_t> row(chunk.end - chunk.begin + 2);  // where that of i ends, two places on
   const auto each = [&](auto&& use) {
-    for (const Chunk& from : bed.chunks)
-      if (const auto found = from.found.find(chunk.number); found != from.found.end())
-        for (const GrainPair& pair : found->second) use(pair, pair.i - chunk.begin);
+    for (const Index from : chunk.finders)
+      for (const GrainPair& pair : bed.chunks[from].found.at(chunk.number)) use(pair, pair.i - chunk.begin);
   };
   each([&](const GrainPair&, Index at) { ++row[at + 2]; });
   for (std::size_t k = 2; k < row.size(); ++k) row[k] += row[k - 1];
@@ -216,6 +215,10 @@ double find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const C
   const BodyMotion& bodies = control.bodies;
   grains.sort(space, bed.scene, bed.grain.data(), bed.n, bed.margin);
   for_each_chunk(space, bed, [&](Chunk& chunk) { find_pairs(bed, chunk, grains); });
+  for (Chunk& chunk : bed.chunks) chunk.finders.clear();
+  for (const Chunk& chunk : bed.chunks)
+    for (const auto& [of, pairs] : chunk.found)
+      if (!pairs.empty()) bed.chunks[of].finders.push_back(chunk.number);
   for_each_chunk(space, bed, [&](Chunk& chunk) {
     take_pairs(bed, chunk);
     find_plane_pairs(bed, chunk, bodies);
