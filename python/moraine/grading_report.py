@@ -20,6 +20,7 @@ from .style import lines, page as page_width, panel, plt
 gradings = {"1": "1:1", "5": "1:5", "20": "1:20", "fractal": "fractal"}  # names of the cases, shear-NAME, in the order of the report
 thirds = 3          # of the mass, by size: the finest, the middle and the coarsest
 late = strength.late
+bounded = 0.8        # of the free depth: a shear zone that takes more is bounded by it
 
 
 def by_mass(radius):
@@ -143,9 +144,16 @@ class Run:
             number.append(strong.mean()), force.append(f[strong].sum() / f.sum())
         return np.mean(number), np.mean(force)
 
+    def reach(self, depth):
+        """Of the depth from the middle of the driven layer down to the layer that stands still, the share that the shear zone takes."""
+        g = self.stage.snapshots[-1].grains
+        z, role = g["position"][:, 2], g["role"]
+        return depth * self.d50 / (z[role == 2].mean() - z[role == 1].max())
+
     def measured(self):
         s = strength.strength(self.stage)
         depth, block = profile.shear_zone(self.stage.snapshots[-1], diameter=self.d50)
+        half, _ = profile.shear_zone(self.stage.snapshots[-1], share=0.5, diameter=self.d50)
         share, contacts, fines = self.bearing()
         strong, carried = self.strong_contacts()
         tail = self.rows["shear_strain"] >= 0.9 * self.rows["shear_strain"][-1]
@@ -154,7 +162,7 @@ class Run:
             "d50_m": self.d50, "widest": float(self.radius.max() / self.radius.min()), "strain": s.strain,
             "friction_peak": s.peak, "strain_peak": s.peak_strain, "friction_ultimate": s.ultimate, "friction_ultimate_std": s.ultimate_std,
             "dilation_d50": self.dilation[tail].mean(), "height_0_m": shearing.height_0(self.rows), "porosity_0": shearing.porosity_0(self.rows),
-            "shear_zone_d50": depth, "shear_zone_integral_d50": block, "segregation_d50": self.segregation(),
+            "shear_zone_d50": depth, "shear_zone_reach": self.reach(depth), "shear_zone_half_d50": half, "shear_zone_integral_d50": block, "segregation_d50": self.segregation(),
             "load_bearing_share": share, "contacts_of_load_bearing": contacts, "pressure_of_finest_third": fines,
             "strong_contacts": strong, "force_of_strong_contacts": carried, "inertia_number": self.inertia_number,
             "hours": measure.hours(self.case),
@@ -178,7 +186,8 @@ def load(study, note):
 
 quantities = {  # column: name, digits
     "friction_peak": ("peak friction", 3), "friction_ultimate": ("ultimate friction", 3), "dilation_d50": ("dilation (D50)", 2),
-    "shear_zone_d50": ("shear zone, to 5 % (D50)", 1), "shear_zone_integral_d50": ("as a block (D50)", 1),
+    "shear_zone_d50": ("shear zone, to 5 % (D50)", 1), "shear_zone_reach": ("its share of the depth that is free", 2),
+    "shear_zone_half_d50": ("depth of half the displacement (D50)", 1), "shear_zone_integral_d50": ("as a block (D50)", 1),
     "porosity_0": ("porosity before shear", 3), "segregation_d50": ("finest third over coarsest (D50)", 2),
     "load_bearing_share": ("grains that bear load", 2), "contacts_of_load_bearing": ("contacts of each of these", 2),
     "pressure_of_finest_third": ("pressure of the finest third", 2), "strong_contacts": ("contacts above 4 times the mean", 3),
@@ -233,10 +242,10 @@ def findings(rows):
     for g in present(rows):
         if g == "1":
             continue
-        zone, friction = difference(rows, "shear_zone_d50", g), difference(rows, "friction_ultimate", g)
+        zone, friction = difference(rows, "shear_zone_half_d50", g), difference(rows, "friction_ultimate", g)
         peak = difference(rows, "friction_peak", g)
-        found.append([f"shear zone of {gradings[g]} over that of 1:1, D50", "fines localise strain (Morgan & Boettcher 1999, two dimensions)",
-                      verdict(*zone, 1, "thinner", "thicker")])
+        found.append([f"depth of half the displacement of {gradings[g]} less that of 1:1, D50", "fines localise strain (Morgan & Boettcher 1999, two dimensions)",
+                      verdict(*zone, 1, "shallower", "deeper")])
         found.append([f"ultimate friction of {gradings[g]} less that of 1:1",
                       "no difference (Mair et al. 2002, glass beads); slightly lower with more fines (Morgan 1999, two dimensions)",
                       verdict(*friction, 3, "lower", "higher")])
@@ -360,6 +369,10 @@ def build(study, output, notes=None, say=print):
         page.heading("Beside what the paper tells of others (par. 56)")
         page.paragraph("Differences of means over packings, averaged over the normal stresses, with their 95 % interval.")
         page.table(["quantity", "others", "here"], found)
+    reach = values(rows, "shear_zone_reach")
+    if reach.max() > bounded:
+        page.paragraph(f"The shear zone, down to 5 % of the displacement, takes {100 * reach.min():.0f} to {100 * reach.max():.0f} % of the depth down to the layer that stands still: "
+                       "these beds are too low for it to end by itself, and its thickness follows their height. So the depth of half the displacement is compared.")
     for sigma, table in tables(rows).items():
         page.heading(f"At {sigma:g} kPa")
         page.table(["quantity", *(gradings[g] for g in present(rows))], table)
