@@ -74,6 +74,20 @@ void print_water(const cases::Case& c, const Stage& stage, const dem::State& s,
   }
 }
 
+// Told apart by the middle between the two, where they do not overlap: few grains have few coarse ones, and
+// may miss the fraction that was asked for. volume: m3, of all grains.
+void print_mixture(const cases::Grains& g, const dem::State& s, double volume) {
+  const double middle = std::sqrt(g.radius_mean * g.fine_radius_mean);
+  if (g.fine_radius_mean + 3 * g.fine_radius_std > middle || middle > g.radius_mean - 3 * g.radius_std)
+    return;
+  dem::Index coarse = 0;
+  double fine = 0;
+  for (const double r : s.r) r < middle ? fine += dem::sphere_volume(r) : ++coarse;
+  std::printf(
+      "  mixture       %d grains are wider than %.4g m, %.4g of the mass is finer (asked for: %.4g)\n",
+      coarse, 2 * middle, fine / volume, g.fine_fraction);
+}
+
 constexpr double long_run = 7 * 86400, short_step = 1e-9, a_day = 86400;  // s
 
 // The step goes as r^1.5 k^-0.5, by the smallest grain.
@@ -144,16 +158,7 @@ void check_case(const Options& options) {
         c.density_scaling, inertial_density / c.grains.density,
         std::pow(2 * c.density_scaling / sizes.smallest, 1.5));
   }
-  if (c.start.empty() && c.grains.distribution == "bimodal") {
-    // By the middle between the two: to see whether there are grains enough to meet what was asked for.
-    const double middle = std::sqrt(c.grains.radius_mean * c.grains.fine_radius_mean);
-    dem::Index coarse = 0;
-    double fine = 0;
-    for (const double r : state.r) r < middle ? fine += dem::sphere_volume(r) : ++coarse;
-    std::printf(
-        "  mixture       %d grains are wider than %.4g m, %.4g of the mass is finer (asked for: %.4g)\n",
-        coarse, 2 * middle, fine / volume, c.grains.fine_fraction);
-  }
+  if (c.start.empty() && c.grains.distribution == "bimodal") print_mixture(c.grains, state, volume);
   if (!start.roles.empty())
     std::printf("  roles         %td grains of bottom_layer, %td of top_layer\n",
                 std::ranges::count(start.roles, dem::BodyId::bottom_layer),
