@@ -264,10 +264,7 @@ def build(study, output, notes=None, say=print):
         page.paragraph(why.replace(f"{root}/", ""))
     if notes:
         page.notes(Path(notes).read_text())
-    page.heading("Figures")
-    for name, draw in (("overlay", lambda: overlay_figure(run, theirs)), ("phase", lambda: phase_figure(runs, theirs))):
-        style.save(draw(), output / "figures" / name, ("svg", "png"), dpi=130)
-        page.figure(name, captions[name], output / "figures")
+    page.figures({"overlay": lambda: overlay_figure(run, theirs), "phase": lambda: phase_figure(runs, theirs)}, captions, output / "figures")
     page.write(output, "Damsgaard et al. (2016), reproduced with Moraine")
     say(str(output / "report.html"))
     for line in levels:

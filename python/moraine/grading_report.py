@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from scipy import stats
 
-from . import compaction, forces, measure, profile, shearing, strength, style
+from . import compaction, forces, measure, profile, shearing, strength
 from .case import Case, MissingData
 from .intervals import mean_interval, show
 from .page import LeftOut, Page, machine, version
@@ -380,13 +380,8 @@ def build(study, output, notes=None, say=print):
         page.paragraph(why)
     if notes:
         page.notes(Path(notes).read_text())
-    page.heading("Figures")
-    for name, draw in {"curves": curves_figure, "profiles": profiles_figure, "chains": chains_figure}.items():
-        try:
-            style.save(draw(runs), output / "figures" / name, ("svg", "png"), dpi=130)
-            page.figure(name, captions[name], output / "figures")
-        except (MissingData, ValueError) as why:
-            page.paragraph(f"{name} is not drawn: {why}")
+    page.figures({"curves": lambda: curves_figure(runs), "profiles": lambda: profiles_figure(runs), "chains": lambda: chains_figure(runs)},
+                 captions, output / "figures")
     page.write(output, "Sizes of grains, with Moraine")
     say(str(output / "report.html"))
     for quantity, _, here in found:

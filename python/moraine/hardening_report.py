@@ -335,16 +335,10 @@ def build(study, output, notes=None, say=print):
         page.paragraph(why)
     if notes:
         page.notes(Path(notes).read_text())
-    page.heading("Figures")
     fastest = [r for r in runs if r.closure == "full"]
     draws = {"curves": lambda: curves_figure(runs), "peaks": lambda: peaks_figure({"": rows} | variants),
              "pressure": lambda: water_figures.pressure(max(fastest, key=lambda r: r.kind.relative_rate).stage)}
-    for name, draw in draws.items():
-        try:
-            style.save(draw(), output / "figures" / name, ("svg", "png"), dpi=130)
-            page.figure(name, captions[name], output / "figures")
-        except (MissingData, ValueError) as why:
-            page.paragraph(f"{name} is not drawn: {why}")
+    page.figures(draws, captions, output / "figures")
     page.write(output, "Damsgaard et al. (2015), reproduced with Moraine")
     say(str(output / "report.html"))
     for line in peak_table(kinds):

@@ -6,6 +6,9 @@ import os
 import platform
 import subprocess
 
+from . import style
+from .case import MissingData
+
 
 class Page:
     """Collects text once and writes it as HTML and as Markdown."""
@@ -34,6 +37,16 @@ class Page:
         self.html.append(f'<figure><img alt="{escape(caption)}" src="data:image/{kind};base64,{base64.b64encode(data).decode()}">'
                          f"<figcaption>{escape(caption)}</figcaption></figure>")
         self.md.append(f"![{name}](figures/{name}.png)\n\n*{caption}*\n")
+
+    def figures(self, draws, captions, directory):
+        """Draws {name: function}, as SVG and PNG in `directory`, under a heading; what cannot be drawn is said."""
+        self.heading("Figures")
+        for name, draw in draws.items():
+            try:
+                style.save(draw(), directory / name, ("svg", "png"), dpi=130)
+                self.figure(name, captions[name], directory)
+            except (MissingData, ValueError) as why:
+                self.paragraph(f"{name} is not drawn: {why}")
 
     def notes(self, text):
         """Markdown of the simplest kind: headings and paragraphs, set apart by empty lines."""

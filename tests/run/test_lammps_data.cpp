@@ -2,6 +2,7 @@
 #include <cstdlib>
 #include <regex>
 
+#include "beginning.hpp"
 #include "case/case.hpp"
 #include "dem/engine.hpp"
 #include "dem/memory_order.hpp"
@@ -108,13 +109,7 @@ TEST_F(LammpsData, SaysWhichLineIsWrong) {
 
 // Forces at step 0, by id.
 std::vector<dem::Vec3d> forces(const fs::path& directory) {
-  const cases::Case c = cases::load(directory);
-  const run::Start start = run::start_of(c);
-  output::Checkpoint now = start.before;
-  const run::Stage stage = run::prepare(c, 0, start, now);
-  const auto engine = dem::make_engine(dem::Backend::cpu, 1);
-  engine->load(stage.scene, now.state);
-  const dem::State s = engine->state();
+  const dem::State s = state_at_step_0(directory);
   std::vector<dem::Vec3d> f(s.size());
   for (dem::Index i = 0; i < s.size(); ++i) f[s.id[i]] = s.force[i];
   return f;

@@ -1,5 +1,6 @@
 // A graded bed that goes out of one run and into another: with the same forces, and with the same bits from
 // there on where the format carries all of them. Snapshots, and roles, as where a case begins.
+#include "beginning.hpp"
 #include "case/case.hpp"
 #include "dem/engine.hpp"
 #include "output/files.hpp"
@@ -71,13 +72,7 @@ struct Beginning {
   double largest = 0;                     // N
 };
 Beginning beginning_of(const fs::path& directory) {
-  const cases::Case c = cases::load(directory);
-  const run::Start start = run::start_of(c);
-  output::Checkpoint now = start.before;
-  const run::Stage stage = run::prepare(c, 0, start, now);
-  const auto engine = dem::make_engine(dem::Backend::cpu, 1);
-  engine->load(stage.scene, now.state);
-  const dem::State s = engine->state();
+  const dem::State s = state_at_step_0(directory);
   Beginning b;
   b.force.resize(s.size()), b.torque.resize(s.size());
   for (dem::Index i = 0; i < s.size(); ++i) {
