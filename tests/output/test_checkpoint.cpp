@@ -55,7 +55,7 @@ class CheckpointFile : public testing::Test {
     return message([&] { read_checkpoint(path); });
   }
   // As if the file had been written with what now stands in it.
-  void reseal(std::int64_t format = 8) const {
+  void reseal(std::int64_t format = 9) const {
     std::string bytes = contents(path);
     seal(bytes, "checkpoint", format);
     directory.write("checkpoint.h5", bytes);
@@ -215,7 +215,7 @@ TEST_F(CheckpointFile, RefusesAnotherFormat) {
   reseal(1000);
   EXPECT_EQ(
       why_not(),
-      path.string() + ": written by a later version of moraine (checkpoint format 1000; this one reads 8)");
+      path.string() + ": written by a later version of moraine (checkpoint format 1000; this one reads 9)");
 
   directory.write("checkpoint.h5", hdf5);  // has lost its seal
   EXPECT_THROW(read_checkpoint(path), Damaged);
