@@ -51,7 +51,7 @@ std::vector<Variant> variants() {
   });
   add("rolling", [](Scene& s) { resist_rolling(s); });
   add("rolling and twisting", [](Scene& s) { resist_rolling(s, 0.2, 0.1); });
-  add("cohesion", [](Scene& s) { cohere(s, 0.2); });
+  add("cohesion", [](Scene& s) { cohere(s, 0.05); });
   add("every law", [](Scene& s) { use_every_law(s); });
   return all;
 }
