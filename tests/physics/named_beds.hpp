@@ -33,7 +33,9 @@ inline std::vector<NamedBed> named_beds(const Bed& open, const Bed& walled, cons
                           {"rolling", sheared_bed(open)},
                           {"restitution, cohesion, no ledger", sheared_bed(open)},
                           {"every law, along side walls", sheared_between_walls(walled)},
-                          {"every law, sizes 1:20", sheared_graded_bed(graded)}};
+                          {"every law, sizes 1:20", sheared_graded_bed(graded)},
+                          {"a velocity that changes, with a profile, on a slope", sheared_bed(open)},
+                          {"stresses that change", sheared_bed(open)}};
   for (ContactParameters& p : a[1].bed.scene.contact) p.mu_d = 0.3;
   drive_top_layer(a[2].bed.scene, Drive::by(400));
   damp_grains(a[2].bed.scene, 5);
@@ -52,6 +54,12 @@ inline std::vector<NamedBed> named_beds(const Bed& open, const Bed& walled, cons
   a[16].bed.scene.ledger = false, cohere(a[16].bed.scene, 0.1);
   for (ContactParameters& p : a[16].bed.scene.contact) p.zeta = 0.1;
   use_every_law(a[17].bed.scene), use_every_law(a[18].bed.scene);
+  Scene& uneven = a[19].bed.scene;
+  uneven.down = {std::sin(0.1), 0, -std::cos(0.1)};
+  drive_top_layer(uneven, changing_velocity());
+  damp_grains(uneven, 5);
+  a[20].bed.scene.body(BodyId::top_wall).z.rate = 2e4;
+  drive_top_layer(a[20].bed.scene, changing_stress());
   return a;
 }
 

@@ -53,6 +53,12 @@ std::vector<Variant> variants() {
   add("rolling and twisting", [](Scene& s) { resist_rolling(s, 0.2, 0.1); });
   add("cohesion", [](Scene& s) { cohere(s, 0.05); });
   add("every law", [](Scene& s) { use_every_law(s); });
+  all.push_back({"a velocity that changes, with a profile", sheared_bed()});
+  drive_top_layer(all.back().bed.scene, changing_velocity());
+  all.push_back({"stresses that change, on a slope", sheared_bed()});
+  drive_top_layer(all.back().bed.scene, changing_stress());
+  all.back().bed.scene.body(BodyId::top_wall).z.rate = 2e4;
+  all.back().bed.scene.down = {std::sin(0.1), 0, -std::cos(0.1)};
   return all;
 }
 
