@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <map>
 
 #include "dem/body/motion.hpp"
 #include "dem/leapfrog.hpp"
@@ -29,10 +30,10 @@ struct Resistance {
 Resistance springs(const ContactParameters& p) { return {p.k_n, p.mu_s > 0 ? p.k_t : 0}; }
 Resistance dashpots(const ContactParameters& p) { return {p.gamma_n, p.mu_s > 0 ? p.gamma_t : 0}; }
 
-using Resistances = std::array<Resistance, materials>;  // by what the grain touches
+using Resistances = std::array<Resistance, material_pairs>;
 Resistances of_contacts(const Scene& scene, Resistance of(const ContactParameters&)) {
   Resistances all;
-  for (int m = 0; m < materials; ++m) all[m] = of(scene.contact[m]);
+  for (int pair = 0; pair < material_pairs; ++pair) all[pair] = of(scene.contact[pair]);
   return all;
 }
 
@@ -44,11 +45,11 @@ class Network {
     const auto root = [](double inverse_mass) { return std::sqrt(inverse_mass); };
     double layer_mass = 0;
     for (Index i = 0; i < n_; ++i) {
-      const Mobility m = mobility(scene, s.r[i], s.part_of[i]);
+      const Mobility m = mobility(scene, s.r[i], s.material_of(i), s.part_of[i]);
       const double xy = root(m.inverse_mass_xy), spin = root(m.inverse_inertia);
       root_.push_back({xy, xy, root(m.inverse_mass_z)});
       root_.push_back({spin, spin, spin});
-      if (s.part_of[i] == BodyId::top_layer) layer_mass += scene.inertial_mass(s.r[i]);
+      if (s.part_of[i] == BodyId::top_layer) layer_mass += scene.inertial_mass(s.r[i], s.material_of(i));
     }
     const Body &wall = scene.body(BodyId::top_wall), &layer = scene.body(BodyId::top_layer);
     if (wall.z.kind == Drive::Kind::stress) wall_root_ = root(1 / wall.mass);
@@ -56,7 +57,7 @@ class Network {
 
     const Sides sides = Sides::of(scene);
     for (const Contact& c : s.contacts)
-      bonds_.push_back({c.i, c.j, Material::grain, false,
+      bonds_.push_back({c.i, c.j, pair_number(s.material_of(c.i), s.material_of(c.j)), false,
                         between_grains(nearest_image(sides, s.x[c.i] - s.x[c.j]), s.r[c.i] + s.r[c.j],
                                        s.r[c.i] - s.r[c.j])});
     for (const WallContact& w : s.wall_contacts) {
@@ -64,7 +65,8 @@ class Network {
       if (!plane.is_there()) continue;
       const Geometry<double> g =
           at_plane(s.x[w.i], s.r[w.i], plane.axis, place_of(scene, s, w.wall), plane.facing);
-      bonds_.push_back({w.i, w.wall == BodyId::top_wall ? n_ : -1, plane.material, true, g});
+      bonds_.push_back({w.i, w.wall == BodyId::top_wall ? n_ : -1,
+                        pair_number(s.material_of(w.i), plane.material), true, g});
     }
   }
 
@@ -83,7 +85,7 @@ class Network {
 
     std::vector<Vec3d>& load = load_;
     load.assign(motion_.size(), Vec3d{0, 0, 0});
-    for (const Bond& b : bonds_) resist(b, resistances[static_cast<std::size_t>(b.material)], load);
+    for (const Bond& b : bonds_) resist(b, resistances[static_cast<std::size_t>(b.materials)], load);
 
     double layer_force = 0;
     for (Index i = 0; i < n_; ++i)
@@ -96,8 +98,8 @@ class Network {
 
  private:
   struct Bond {
-    Index i, j;  // j = n_: top wall, -1: a plane that stands still
-    Material material;
+    Index i, j;     // j = n_: top wall, -1: a plane that stands still
+    int materials;  // pair_number
     bool at_plane;
     Geometry<double> g;
   };
@@ -228,14 +230,25 @@ double critical_step(const Spectrum& s) {
 }
 
 double one_contact_step(const Scene& scene, const State& s) {
-  const double m = scene.inertial_mass(*std::min_element(s.r.begin(), s.r.end()));
+  std::map<Material, double> lightest;  // kg
+  for (Index i = 0; i < s.size(); ++i) {
+    const double m = scene.inertial_mass(s.r[i], s.material_of(i));
+    const auto [at, first] = lightest.emplace(s.material_of(i), m);
+    at->second = std::min(at->second, m);
+  }
   const double turning = 2.5;  // m r^2/I of a sphere
-  double step = critical_step(scene.with(Material::grain), 2 / m, 2 * turning / m);
-  for (const BodyId id : planes) {
-    const Body& plane = scene.body(id);
-    if (!plane.is_there()) continue;
-    const double inverse_mass = plane.along(plane.axis).kind == Drive::Kind::stress ? 1 / plane.mass : 0;
-    step = std::min(step, critical_step(scene.with(plane.material), 1 / m + inverse_mass, turning / m));
+  double step = std::numeric_limits<double>::infinity();
+  for (const auto& [of, m] : lightest) {
+    for (const auto& [other, m_j] : lightest)
+      step = std::min(step,
+                      critical_step(scene.between(of, other), 1 / m + 1 / m_j, turning / m + turning / m_j));
+    for (const BodyId id : planes) {
+      const Body& plane = scene.body(id);
+      if (!plane.is_there()) continue;
+      const double inverse_mass = plane.along(plane.axis).kind == Drive::Kind::stress ? 1 / plane.mass : 0;
+      step =
+          std::min(step, critical_step(scene.between(of, plane.material), 1 / m + inverse_mass, turning / m));
+    }
   }
   return step;
 }

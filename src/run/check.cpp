@@ -148,9 +148,9 @@ void check_case(const Options& options) {
   double inertial_density = c.grains.density;
   if (c.density_scaling > 0.5 * sizes.smallest) {
     dem::Scene scaled;
-    scaled.density = c.grains.density, scaled.least_inertia = c.density_scaling;
+    scaled.density.fill(c.grains.density), scaled.least_inertia = c.density_scaling;
     double mass = 0;
-    for (const double r : state.r) mass += scaled.inertial_mass(r);
+    for (const double r : state.r) mass += scaled.inertial_mass(r, dem::Material::grain);
     inertial_density = mass / volume;
     std::printf(
         "  scaling       radii below %.4g m have its inertia: the bed's is %.3g times its own, and the step "

@@ -105,8 +105,8 @@ void Estimate::pack() {
   const std::vector<double>& r = start_.before.state.r;
   dem::Scene scene;
   scene.box = {start_.box_x, start_.box_y, 0};
-  scene.density = case_.grains.density, scene.gravity = 0, scene.ledger = false;
-  const double mass = scene.inertial_mass(*std::min_element(r.begin(), r.end()));
+  scene.density.fill(case_.grains.density), scene.gravity = 0, scene.ledger = false;
+  const double mass = scene.inertial_mass(*std::min_element(r.begin(), r.end()), dem::Material::grain);
   scene.dt = 0.15 * std::sqrt(mass / case_.contact.k_n);
   dem::ContactParameters smooth;
   smooth.k_n = case_.contact.k_n, smooth.gamma_n = 0.5 * std::sqrt(mass * case_.contact.k_n);

@@ -77,7 +77,7 @@ void write_lammps(std::ostream& out, const dem::Scene& scene, const dem::State& 
   out << "\nAtoms # sphere\n\n";
   for (dem::Index i = 0; i < s.size(); ++i) {
     out << s.id[i] + 1 << " 1 ";
-    add(out, {2 * s.r[i], scene.density, s.x[i].x, s.x[i].y, s.x[i].z}, " ");
+    add(out, {2 * s.r[i], scene.density_of(s.material_of(i)), s.x[i].x, s.x[i].y, s.x[i].z}, " ");
   }
   out << "\nVelocities\n\n";
   for (dem::Index i = 0; i < s.size(); ++i) {

@@ -26,7 +26,7 @@ struct Mode {
 // Of the smallest grain, radius r.
 std::vector<Mode> modes_of(const Stage& stage, const dem::State& s, double r) {
   const dem::Scene& scene = stage.scene;
-  const double w = 1 / scene.inertial_mass(r);
+  const double w = 1 / scene.inertial_mass(r, dem::Material::grain);
   const auto sticks = [](const dem::ContactParameters& p, double value) { return p.mu_s > 0 ? value : 0; };
   std::vector<Mode> modes;
   const auto add = [&](const dem::ContactParameters& p, bool wall, double bodies) {

@@ -8,6 +8,8 @@
 #include "dem/memory_order.hpp"
 #include "dem/observe.hpp"
 #include "dem/packing.hpp"
+#include "dem/state_rows.hpp"
+#include "dem/uses.hpp"
 #include "error.hpp"
 #include "output/sealed.hpp"
 #include "run/needs.hpp"
@@ -53,7 +55,7 @@ dem::Scene scene_of(const cases::Case& c, const cases::Stage& stage, const Start
   dem::Scene scene;
   scene.box = box;
   scene.periodic_x = c.periodic_x, scene.periodic_y = c.periodic_y, scene.periodic_z = c.periodic_z;
-  scene.gravity = c.gravity, scene.density = c.grains.density;
+  scene.gravity = c.gravity, scene.density.fill(c.grains.density);
   scene.least_inertia = c.density_scaling;
   dem::ContactParameters &grain = scene.with(dem::Material::grain), &wall = scene.with(dem::Material::wall);
   grain = c.contact, wall = c.wall;
@@ -117,10 +119,10 @@ double sauter_diameter(const dem::State& s) {
 
 // dt = f sqrt(min m / max k), eq. 9; the walls count among the k.
 double step_by_eq_9(const dem::Scene& scene, const dem::State& s, double f) {
-  const double m = scene.inertial_mass(*std::min_element(s.r.begin(), s.r.end()));
   double k = 0;
-  for (const dem::ContactParameters& p : scene.contact) k = std::max({k, p.k_n, p.k_t});
-  return f * std::sqrt(m / k);
+  const auto stiffest = [&k](const dem::ContactParameters& p) { k = std::max({k, p.k_n, p.k_t}); };
+  dem::for_each_pair_of_grains(scene, stiffest), dem::for_each_pair_with_walls(scene, stiffest);
+  return f * std::sqrt(dem::least_mass(scene, s) / k);
 }
 
 static double step_of(const cases::Case& c, const cases::Stage& stage, const dem::Scene& scene,
@@ -366,8 +368,7 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, outpu
     out.warnings = asks_for_other_layers(c, index);
     return out;
   }
-  const dem::ContactParameters& grain = now.scene.with(dem::Material::grain);
-  if (s.staggered && grain.mu_d == grain.mu_s) dem::mark_slipping(now.scene, s);
+  if (s.staggered) dem::mark_slipping(now.scene, s);
   dem::synchronise(now.scene, s);
   forget(stage, s);
   if (!top_wall_of(c, stage, start, 0).is_there())

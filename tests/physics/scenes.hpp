@@ -16,7 +16,7 @@
 namespace moraine::dem {
 
 inline double length(const Vec3d& a) { return std::sqrt(dot(a, a)); }
-inline double mass(const Scene& s, double r) { return sphere_mass(s.density, r); }
+inline double mass(const Scene& s, double r) { return sphere_mass(s.density_of(Material::grain), r); }
 inline double inertia(const Scene& s, double r) { return 0.4 * mass(s, r) * r * r; }
 
 // Parameters of a contact, all of which a test has to give.

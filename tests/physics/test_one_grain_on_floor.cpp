@@ -134,7 +134,7 @@ Incline roll_down(double theta, double mu, double l_expected) {
   // Starts as it would roll or slip for ever.
   const double share = 1 / (1 + 2.5 * l_expected * l_expected / (R * R));
   const double hold = std::min(share * m * g * std::sin(theta), mu * normal);
-  const Mobility mobility_of = mobility(s, R, BodyId::none);
+  const Mobility mobility_of = mobility(s, R, Material::grain, BodyId::none);
   const Triple dt(Vec3d{s.dt, s.dt, s.dt});
   const Plane floor{.id = BodyId::floor};
   GrainRow grain{{0, 0, R - normal / s.with(Material::wall).k_n}, R, {0, 0, 0}, R, {0, 0, 0}, 0, {}, 0};

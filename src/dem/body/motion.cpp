@@ -45,7 +45,7 @@ Servo servo_of(const Scene& scene, const State& s, BodyId id, int axis, int plan
   servo.mass = b.mass;
   if (plane < 0)
     for (Index i = 0; i < s.size(); ++i)
-      if (s.part_of[i] == id) servo.mass += scene.inertial_mass(s.r[i]);
+      if (s.part_of[i] == id) servo.mass += scene.inertial_mass(s.r[i], s.material_of(i));
   return servo;
 }
 

@@ -115,10 +115,10 @@ inline void ask_for(const PairList& list, std::int64_t group) {
 }
 
 template <class L, Account account, Shares shares, Lists lists, class P>
-[[gnu::flatten]] void list_forces(Bed& bed, PairList& list, double dt, LoadRow* load) {
+[[gnu::flatten]] void run_forces(Bed& bed, PairList& list, std::size_t run, double dt, LoadRow* load) {
   constexpr int packs = block_pairs / P::width, packs_in_group = lanes / P::width;
   const Rows rows(bed.grain);
-  const ContactParameters law = bed.scene.with(Material::grain);
+  const ContactParameters law = bed.scene.contact[static_cast<std::size_t>(list.runs[run].materials)];
   const Sides sides = bed.sides;
   LoadRow* const slot = bed.slot.data();
 
@@ -134,8 +134,9 @@ template <class L, Account account, Shares shares, Lists lists, class P>
       return motion[q].before.v;
   };
 
-  const auto all = static_cast<std::int64_t>(list.pairs.size()) * packs_in_group;
-  for (std::int64_t start = 0; start < all; start += packs) {
+  const std::int64_t first = std::int64_t{list.runs[run].first_group} * packs_in_group,
+                     all = std::int64_t{list.end_of(run)} * packs_in_group;
+  for (std::int64_t start = first; start < all; start += packs) {
     const int block = static_cast<int>(std::min<std::int64_t>(packs, all - start));
     const auto group = [&](int q) -> const PairGroup& { return list.pairs[(start + q) / packs_in_group]; };
     const auto lane = [&](int q) { return static_cast<int>((start + q) % packs_in_group) * P::width; };
@@ -170,6 +171,12 @@ template <class L, Account account, Shares shares, Lists lists, class P>
       scatter<L, shares>(&p.i[lane(q)], &p.target[lane(q)], at, a, load, slot);
     }
   }
+}
+
+template <class L, Account account, Shares shares, Lists lists, class P>
+void list_forces(Bed& bed, PairList& list, double dt, LoadRow* load) {
+  for (std::size_t run = 0; run < list.runs.size(); ++run)
+    run_forces<L, account, shares, lists, P>(bed, list, run, dt, load);
 }
 
 template <class L, Account account, class P>
