@@ -55,7 +55,7 @@ class CheckpointFile : public testing::Test {
     return message([&] { read_checkpoint(path); });
   }
   // As if the file had been written with what now stands in it.
-  void reseal(std::int64_t format = 8) const {
+  void reseal(std::int64_t format = 9) const {
     std::string bytes = contents(path);
     seal(bytes, "checkpoint", format);
     directory.write("checkpoint.h5", bytes);
@@ -215,7 +215,7 @@ TEST_F(CheckpointFile, RefusesAnotherFormat) {
   reseal(1000);
   EXPECT_EQ(
       why_not(),
-      path.string() + ": written by a later version of moraine (checkpoint format 1000; this one reads 8)");
+      path.string() + ": written by a later version of moraine (checkpoint format 1000; this one reads 9)");
 
   directory.write("checkpoint.h5", hdf5);  // has lost its seal
   EXPECT_THROW(read_checkpoint(path), Damaged);
@@ -224,7 +224,7 @@ TEST_F(CheckpointFile, RefusesAnotherFormat) {
   EXPECT_TRUE(
       contains(why_not(), path.string() + ": written by an earlier version of moraine (checkpoint format 4"))
       << why_not();
-  EXPECT_TRUE(contains(why_not(), "this one reads 8")) << why_not();
+  EXPECT_TRUE(contains(why_not(), "this one reads 9")) << why_not();
 }
 
 // A checkpoint before it is no help where this version is the wrong one.
@@ -299,8 +299,8 @@ TEST_F(CheckpointFile, RefusesWhatIsNoScene) {
   const auto five = [](auto& choice) { choice = static_cast<std::decay_t<decltype(choice)>>(5); };
   expect_refused([&](Scene& s) { five(s.body(BodyId::floor).shape); },
                  "/shape: 5 is not a value from 0 to 2");
-  expect_refused([&](Scene& s) { five(s.body(BodyId::floor).material); },
-                 "/material: 5 is not a value from 0 to 1");
+  expect_refused([&](Scene& s) { s.body(BodyId::floor).material = static_cast<dem::Material>(5); },
+                 "/material: 5 is not a value from 0 to 4");
   expect_refused([&](Scene& s) { five(s.body(BodyId::floor).x.kind); },
                  "/kind: 5 is not a value from 0 to 3");
   expect_refused([](Scene& s) { s.body(BodyId::floor) = dem::layer({}, true); }, "the floor has the shape");
