@@ -203,6 +203,7 @@ template <>
 constexpr std::tuple members<Checkpoint>{
     Member{"case_text", &Checkpoint::case_text},
     Member{"version", &Checkpoint::version},
+    Member{"materials", &Checkpoint::materials},
     Member{"inputs", &Checkpoint::inputs},
     Member{"stage", &Checkpoint::stage},
     Member{"start", &Checkpoint::start},

@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "dem/scene_check.hpp"
+#include "dem/state_rows.hpp"
+#include "dem/uses.hpp"
 #include "error.hpp"
 #include "memory.hpp"
 #include "output/files.hpp"
@@ -23,22 +25,30 @@ struct Mode {
   bool certain;         // that these contacts exist
 };
 
-// Of the smallest grain, radius r.
-std::vector<Mode> modes_of(const Stage& stage, const dem::State& s, double r) {
+// Of the lightest grain; with several materials, as if it touched any of them.
+std::vector<Mode> modes_of(const Stage& stage, const dem::State& s) {
   const dem::Scene& scene = stage.scene;
-  const double w = 1 / scene.inertial_mass(r, dem::Material::grain);
+  const double w = 1 / dem::least_mass(scene, s);
   const auto sticks = [](const dem::ContactParameters& p, double value) { return p.mu_s > 0 ? value : 0; };
   std::vector<Mode> modes;
+  std::vector<dem::ContactParameters> of_grains, of_walls;  // told so far
   const auto add = [&](const dem::ContactParameters& p, bool wall, double bodies) {
+    for (const dem::ContactParameters& before : wall ? of_walls : of_grains)
+      if (before == p) return;
+    (wall ? of_walls : of_grains).push_back(p);
     modes.push_back({wall ? "along the normal of a wall" : "along the normal of two grains",
                      wall ? "wall_gamma_n" : "gamma_n", p.k_n, p.gamma_n, bodies * w, true});
     modes.push_back({wall ? "along a wall" : "along the tangent of two grains",
                      wall ? "wall_gamma_t" : "gamma_t", sticks(p, p.k_t), sticks(p, p.gamma_t),
                      3.5 * bodies * w, true});
   };
-  if (s.size() > 1) add(scene.with(dem::Material::grain), false, 2);
-  const dem::ContactParameters& at_walls = scene.with(dem::Material::wall);
-  if (scene.has_planes()) add(at_walls, true, 1);
+  if (s.size() > 1)
+    dem::for_each_pair_of_grains(scene, [&](const dem::ContactParameters& p) { add(p, false, 2); });
+  dem::ContactParameters at_walls = scene.with(dem::Material::wall);  // the stiffest
+  dem::for_each_pair_with_walls(scene, [&](const dem::ContactParameters& p) {
+    if (scene.has_planes()) add(p, true, 1);
+    at_walls.k_n = std::max(at_walls.k_n, p.k_n), at_walls.gamma_n = std::max(at_walls.gamma_n, p.gamma_n);
+  });
   const dem::Body& top_wall = scene.body(dem::BodyId::top_wall);
   if (top_wall.z.kind == dem::Drive::Kind::stress) {
     const double layer = std::round(
@@ -55,7 +65,7 @@ void check_step(const Stage& stage, const dem::State& s, std::vector<std::string
   const auto smallest = static_cast<dem::Index>(std::min_element(s.r.begin(), s.r.end()) - s.r.begin());
   const std::string about = text("stage ", stage.name, ": ");
   const std::string of = text(" (grain ", s.id[smallest], ", the smallest, of radius ", s.r[smallest], " m)");
-  const std::vector<Mode> modes = modes_of(stage, s, s.r[smallest]);
+  const std::vector<Mode> modes = modes_of(stage, s);
   const auto room_of = [&](const Mode& m) { return 1 - 0.25 * m.k * m.w * dt * dt; };
   // Then the run will not pass the guards, and it is the step that must change.
   const bool step_too_long =

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "case/csv.hpp"
+#include "case/materials.hpp"
 #include "dem/engine.hpp"
 #include "dem/memory_order.hpp"
 #include "dem/observe.hpp"
@@ -12,6 +13,7 @@
 #include "dem/uses.hpp"
 #include "error.hpp"
 #include "output/sealed.hpp"
+#include "run/material_of_grains.hpp"
 #include "run/needs.hpp"
 #include "run/own_grains.hpp"
 #include "run/press.hpp"
@@ -63,6 +65,7 @@ dem::Scene scene_of(const cases::Case& c, const cases::Stage& stage, const Start
   grain.mu_s = stage.mu_s, grain.mu_d = stage.mu_d;
   wall.gamma_n = stage.wall_gamma_n, wall.gamma_t = stage.wall_gamma_t;
   wall.mu_s = wall.mu_d = stage.wall_mu;
+  cases::set_materials(c, stage, scene);
   scene.neighbour_margin = c.neighbour_margin, scene.ledger = c.ledger;
   scene.fluid_density = stage.fluid ? c.fluid.density : 0;
   if (!c.floor) scene.body(BodyId::floor) = {};
@@ -144,9 +147,23 @@ static std::vector<dem::Sieve> sieves_in(const std::filesystem::path& file) {
   return sieves;
 }
 
+// Springs of a snapshot, which were found from its forces with contact.k_t.
+static void springs_of_pairs(const cases::Case& c, dem::State& s) {
+  if (s.material.empty()) return;
+  dem::Scene scene;
+  scene.with(dem::Material::grain) = c.contact;
+  cases::set_materials(c, c.stages.at(0), scene);
+  for (dem::Contact& contact : s.contacts) {
+    const double k_t = scene.between(s.material_of(contact.i), s.material_of(contact.j)).k_t;
+    contact.spring.delta_t = (k_t > 0 ? c.contact.k_t / k_t : 0) * contact.spring.delta_t;
+  }
+}
+
 Start start_of(const cases::Case& c) {
   if (has_own_grains(c.start)) {
     OwnGrains own = read_own_grains(c);
+    take_materials(c, own.state, [&](dem::Index i) { return own.at(i); });
+    if (output::is_snapshot(c.start)) springs_of_pairs(c, own.state);
     Start s{{}, own.box_x, own.box_y, own.box_z, 0};
     s.before.state = std::move(own.state), s.roles = std::move(own.roles), s.note = std::move(own.note);
     s.inputs = input(c.start);
@@ -163,6 +180,8 @@ Start start_of(const cases::Case& c) {
     if (s.before.state.r.empty()) throw error(c.start.string(), ": has no grains");
     s.before.rows.clear(), s.before.snapshots.clear();
     s.before.stage = 0, s.before.start.time = 0, s.before.finished = false;
+    take_materials(c, s.before.state, s.before.scene, s.before.materials,
+                   [&](dem::Index i) { return text(c.start.string(), ": grain ", s.before.state.id[i]); });
     const dem::Scene& scene = s.before.scene;
     expect_same_sides(c, scene.box, {scene.periodic_x, scene.periodic_y, scene.periodic_z});
     if (s.box_x <= 0) s.box_x = scene.box.x;
@@ -201,6 +220,7 @@ Start start_of(const cases::Case& c) {
           loose.box_z > 0 ? loose.box_z : c.box_z,
           default_wall_mass(c, loose.state.size(), loose.cell)};
   s.before.state = std::move(loose.state);
+  take_materials(c, s.before.state, [&](dem::Index i) { return text("grain ", s.before.state.id[i]); });
   if (g.distribution == "sieves") s.inputs = input(g.sieves);
   return s;
 }
