@@ -271,7 +271,8 @@ bool is_left_to_materials(const Draft& draft, const Key& key, const Entries& ent
   const auto entry = entries.find(key.name);
   if (draft.materials.empty() || !is_stage_key(key) || entry == entries.end()) return false;
   const string name = key.name.substr(6);
-  return entry->second.stated.ends_with("(by default)") && (find("contact." + name) || name.starts_with("wall_"));
+  return entry->second.stated.ends_with("(by default)") &&
+         (find("contact." + name) || name.starts_with("wall_"));
 }
 
 // As a case.toml in SI.
@@ -293,7 +294,8 @@ string text_of(const Draft& draft) {
     for (const StageDraft& one : list) {
       text += "\n[[" + name + "]]\n";
       for (const Key& key : keys())
-        if (key.table() == name + "." && !is_left_to_materials(draft, key, one.entries)) add(key, one.entries);
+        if (key.table() == name + "." && !is_left_to_materials(draft, key, one.entries))
+          add(key, one.entries);
     }
   };
   add_list("material", draft.materials), add_list("pair", draft.pairs), add_list("stage", draft.stages);

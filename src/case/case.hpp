@@ -36,8 +36,8 @@ struct Grains {
 // A material of grains or walls.
 struct GrainMaterial {
   std::string name;
-  std::map<std::string, double> of;   // its keys by name ("mu_s", "density"), SI; those not given by contact.*
-  std::vector<double> sizes, layer;   // m, from, to: diameters and heights of the grains it takes; empty: none
+  std::map<std::string, double> of;  // its keys by name ("mu_s", "density"), SI; those not given by contact.*
+  std::vector<double> sizes, layer;  // m, from, to: diameters and heights of the grains it takes; empty: none
   bool operator==(const GrainMaterial&) const = default;
 };
 // What [[pair]] says of two materials, in whatever order; "wall" stands for walls.

@@ -111,14 +111,17 @@ std::vector<Key> rows_of_materials(const std::vector<Key>& table) {
   // clang-format on
   const auto append_for = [&](const string& owner, const string& fallback, const string& meaning) {
     for (const string& name : of_materials) {
-      Key key = *std::find_if(table.begin(), table.end(), [&](const Key& k) { return k.name == "contact." + name; });
-      key.name = owner + name, key.set = set_nothing, key.fallback = fallback.empty() ? "contact." + name : fallback;
+      Key key = *std::find_if(table.begin(), table.end(),
+                              [&](const Key& k) { return k.name == "contact." + name; });
+      key.name = owner + name, key.set = set_nothing,
+      key.fallback = fallback.empty() ? "contact." + name : fallback;
       key.meaning = split(key.meaning, "; a stage")[0].substr(0, key.meaning.find(", at most")) + meaning;
       rows.push_back(key);
     }
   };
   append_for("material.", "", " of its grains among each other, where a stage has none of its own");
-  rows.push_back({"pair.of", Type::list, "", required, "", "two materials, or one and \"wall\"", "", set_nothing});
+  rows.push_back(
+      {"pair.of", Type::list, "", required, "", "two materials, or one and \"wall\"", "", set_nothing});
   append_for("pair.", "contact.pairs", " between the two, where a stage has none of its own");
   return rows;
 }
@@ -311,7 +314,9 @@ bool is_about(const Key& key, const std::vector<string>& words) {
   // "stage.shear.mu_s", as it is set, is stage.mu_s in the table.
   const auto as_key = [](const string& word) {
     const auto first = word.find('.'), last = word.rfind('.');
-    return is_list_of_tables(word.substr(0, first)) && last != word.npos ? word.substr(0, first) + word.substr(last) : word;
+    return is_list_of_tables(word.substr(0, first)) && last != word.npos
+               ? word.substr(0, first) + word.substr(last)
+               : word;
   };
   return std::all_of(words.begin(), words.end(),
                      [&](const string& word) { return text.find(plain(as_key(word))) != text.npos; });

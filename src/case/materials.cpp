@@ -95,7 +95,8 @@ void take(const std::map<string, double>& values, const Stage& stage, const stri
   const auto one = [&](const auto& named) {
     const string name = named.name;
     const bool friction = name == "mu_s" || name == "mu_d";
-    const bool own = stage.own.contains(prefix + name) || (!prefix.empty() && friction && stage.own.contains("wall_mu"));
+    const bool own =
+        stage.own.contains(prefix + name) || (!prefix.empty() && friction && stage.own.contains("wall_mu"));
     if (const auto value = values.find(name); value != values.end() && !own) p.*named.member = value->second;
   };
   std::apply([&](const auto&... named) { (one(named), ...); }, dem::ContactParameters::list());
@@ -108,7 +109,8 @@ void check_pairs(const Draft& draft, const Case& c) {
     const string& stated = draft.pairs[k].entries.at("pair.of").stated;
     const MaterialPair& p = c.pairs[k];
     for (const string& name : {p.first, p.second})
-      if (name != wall && std::find(known.begin(), known.end(), name) == known.end()) throw_unknown(stated, name, known);
+      if (name != wall && std::find(known.begin(), known.end(), name) == known.end())
+        throw_unknown(stated, name, known);
     if (p.first == wall && p.second == wall) throw error(stated, ": walls do not touch one another");
     if (p.first == p.second)
       throw error(stated, ": what grains of ", p.first, " have among each other is said in [[material]]");
@@ -117,8 +119,9 @@ void check_pairs(const Draft& draft, const Case& c) {
   for (std::size_t a = 0; a < c.materials.size(); ++a)
     for (std::size_t b = a + 1; b < c.materials.size(); ++b)
       if (!pair_of(c, c.materials[a].name, c.materials[b].name))
-        throw error(draft.entries.at("contact.pairs").stated, ": there is no [[pair]] of ", c.materials[a].name,
-                    " and ", c.materials[b].name, "; expected one for each two materials of grains");
+        throw error(draft.entries.at("contact.pairs").stated, ": there is no [[pair]] of ",
+                    c.materials[a].name, " and ", c.materials[b].name,
+                    "; expected one for each two materials of grains");
 }
 
 void check_friction(const Case& c) {
@@ -130,8 +133,9 @@ void check_friction(const Case& c) {
       for (int b = a; b < scene.materials; ++b) {
         const auto& p = scene.between(dem::Material(a), dem::Material(b));
         if (p.mu_d > p.mu_s)
-          throw error((c.directory / "case.toml").string(), ": stage ", stage.name, ": between ", c.materials[a].name, " and ",
-                      c.materials[b].name, " mu_d = ", p.mu_d, "; expected at most their mu_s = ", p.mu_s);
+          throw error((c.directory / "case.toml").string(), ": stage ", stage.name, ": between ",
+                      c.materials[a].name, " and ", c.materials[b].name, " mu_d = ", p.mu_d,
+                      "; expected at most their mu_s = ", p.mu_s);
       }
   }
 }
@@ -153,10 +157,13 @@ std::vector<string> material_names(const Case& c) {
 void read_materials(const Draft& draft, Case& c) {
   for (const StageDraft& m : draft.materials) {
     if (m.name == wall)
-      throw error(m.stated, ": expected another name: wall stands for walls in [[pair]]; wall.material says what they are of");
+      throw error(
+          m.stated,
+          ": expected another name: wall stands for walls in [[pair]]; wall.material says what they are of");
     GrainMaterial material = material_in(m, draft, c);
-    const bool of_walls_alone = m.name == c.wall_material && material.sizes.empty() && material.layer.empty() &&
-                                m.name != c.grains.material && draft.materials.size() > 1;
+    const bool of_walls_alone = m.name == c.wall_material && material.sizes.empty() &&
+                                material.layer.empty() && m.name != c.grains.material &&
+                                draft.materials.size() > 1;
     if (m.name == c.wall_material) c.of_walls.push_back(material);
     if (!of_walls_alone) c.materials.push_back(material);
   }
@@ -231,7 +238,9 @@ dem::Material material_of(const Case& c, double diameter, double z) {
                 c.materials[static_cast<std::size_t>(takers[1])].name,
                 " take it; expected one material by material.sizes and material.layer");
   if (takers.empty() && c.grains.material.empty())
-    throw error("no material takes it; expected one by material.sizes or material.layer, or grains.material for all others");
+    throw error(
+        "no material takes it; expected one by material.sizes or material.layer, or grains.material for all "
+        "others");
   return dem::Material(takers.empty() ? material_number(c, c.grains.material) : takers[0]);
 }
 

@@ -7,8 +7,8 @@ namespace moraine::cases {
 // Into c, whose contact.* and stages are there already. Throws Error about names, rules and pairs.
 void read_materials(const Draft& draft, Case& c);
 
-// Tables of contacts and densities of a stage. Its rows of the first material have what the stage and the keys
-// of [contact] and [wall] say. What a stage gives itself holds for all materials.
+// Tables of contacts and densities of a stage. Its rows of the first material have what the stage and the
+// keys of [contact] and [wall] say. What a stage gives itself holds for all materials.
 void set_materials(const Case& c, const Stage& stage, dem::Scene& scene);
 
 // The number of the grains' material of this name; -1: there is none.

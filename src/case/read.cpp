@@ -116,7 +116,8 @@ string turned_round(const string& table, const StageDraft& draft) {
   const auto& names = std::get<std::vector<string>>(of->second.value);
   return names.at(1) + "-" + names.at(0);
 }
-std::vector<StageDraft>::iterator find_in(std::vector<StageDraft>& list, const string& table, const string& name) {
+std::vector<StageDraft>::iterator find_in(std::vector<StageDraft>& list, const string& table,
+                                          const string& name) {
   return std::find_if(list.begin(), list.end(), [&](const StageDraft& s) {
     return s.name == name || (table == "pair" && turned_round(table, s) == name);
   });
@@ -239,9 +240,8 @@ class File {
       return {of[0] + "-" + of[1], entry.stated};
     }
     const string name = text_in(entry);
-    if (name.empty() ||
-        name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_") !=
-            name.npos)
+    if (name.empty() || name.find_first_not_of(
+                            "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_") != name.npos)
       throw error(entry.stated, ": expected letters, digits, - and _");
     return {name, entry.stated};
   }
@@ -257,8 +257,7 @@ class File {
         throw error(stated, ": there is another ", list, " of this name; expected a unique one");
       std::vector<StageDraft>& drafts = draft.list(list);
       auto target = find_in(drafts, list, name);
-      if (target == drafts.end())
-        target = drafts.insert(target, {name, at(element) + list + "." + name, {}});
+      if (target == drafts.end()) target = drafts.insert(target, {name, at(element) + list + "." + name, {}});
       for (const auto& [leaf, value] : *element.as_table()) {
         const string key_name = list + "." + string(leaf.str()),
                      shown = list + "." + name + "." + string(leaf.str());

@@ -91,7 +91,8 @@ void write_lammps(std::ostream& out, const dem::Scene& scene, const dem::State& 
     for (dem::Index i = 0; i < s.size(); ++i)
       if (dem::Sides::of(scene).side[a] == 0)
         low[a] = std::min(low[a], s.x[i][a] - s.r[i]), high[a] = std::max(high[a], s.x[i][a] + s.r[i]);
-  out << "# atom_style sphere, SI units\n\n" << s.size() << " atoms\n"
+  out << "# atom_style sphere, SI units\n\n"
+      << s.size() << " atoms\n"
       << scene.materials << " atom types\n\n";
   for (int a = 0; a < 3; ++a)
     out << digits(low[a]) << " " << digits(high[a]) << " "

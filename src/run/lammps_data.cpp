@@ -224,7 +224,8 @@ static dem::Material type_of(const cases::Case& c, const DataFile& data, const R
   if (c.materials.size() < 2) return dem::Material::grain;
   const double type = data.number(row, 1, "type");
   if (!(type >= 1 && type <= static_cast<double>(c.materials.size())))
-    throw data.wrong(row.line, "type = ", row.words[1], ", and the case has ", c.materials.size(), " materials");
+    throw data.wrong(row.line, "type = ", row.words[1], ", and the case has ", c.materials.size(),
+                     " materials");
   return dem::Material(static_cast<int>(type) - 1);
 }
 static double density_of(const cases::Case& c, dem::Material m) {

@@ -25,7 +25,8 @@ std::vector<dem::Material> renumbered(const cases::Case& c, const std::vector<st
 }
 
 // The scene with its materials called by other numbers.
-dem::Scene with_numbers(const dem::Scene& old, const std::vector<dem::Material>& numbers, std::int32_t count) {
+dem::Scene with_numbers(const dem::Scene& old, const std::vector<dem::Material>& numbers,
+                        std::int32_t count) {
   using dem::Material;
   dem::Scene scene = old;
   scene.materials = count;
