@@ -40,19 +40,19 @@ inline void get_lane(Vec3d& to, const Vec3<Lanes>& v, int lane) {
 
 // As many of them as P has lanes, from `lane` on.
 template <class P>
-void load_lanes(P& p, const Lanes& from, std::int64_t lane) {
+void load_lanes(P& p, const Lanes& from, std::size_t lane) {
   p = P::load(from.v + lane);
 }
 template <class P>
-void load_lanes(Vec3<P>& p, const Vec3<Lanes>& from, std::int64_t lane) {
+void load_lanes(Vec3<P>& p, const Vec3<Lanes>& from, std::size_t lane) {
   load_lanes(p.x, from.x, lane), load_lanes(p.y, from.y, lane), load_lanes(p.z, from.z, lane);
 }
 template <class P>
-void store_lanes(const P& p, Lanes& to, std::int64_t lane) {
+void store_lanes(const P& p, Lanes& to, std::size_t lane) {
   p.store(to.v + lane);
 }
 template <class P>
-void store_lanes(const Vec3<P>& p, Vec3<Lanes>& to, std::int64_t lane) {
+void store_lanes(const Vec3<P>& p, Vec3<Lanes>& to, std::size_t lane) {
   store_lanes(p.x, to.x, lane), store_lanes(p.y, to.y, lane), store_lanes(p.z, to.z, lane);
 }
 
