@@ -266,13 +266,13 @@ string last_kind(const fs::path& start) {
   }
 }
 
-// Whether a stage gives no value of its own, so that each pair of materials has its own.
+// Whether this key of a stage is of contacts, so that each pair of materials may have its own.
+bool differs_by_material(const string& name) { return find("contact." + name) || name.starts_with("wall_"); }
+// Whether a stage gives no value of its own, so that each pair has its own.
 bool is_left_to_materials(const Draft& draft, const Key& key, const Entries& entries) {
   const auto entry = entries.find(key.name);
   if (draft.materials.empty() || !is_stage_key(key) || entry == entries.end()) return false;
-  const string name = key.name.substr(6);
-  return entry->second.stated.ends_with("(by default)") &&
-         (find("contact." + name) || name.starts_with("wall_"));
+  return entry->second.stated.ends_with("(by default)") && differs_by_material(key.name.substr(6));
 }
 
 // As a case.toml in SI.
@@ -340,7 +340,9 @@ Case load_checked(const fs::path& directory, const std::vector<Override>& overri
     if (s.entries.contains("stage.kind")) context.kind = std::get<string>(s.entries.at("stage.kind").value);
     kind_before = context.kind;
     Stage& stage = c.stages.emplace_back();
-    for (const auto& [name, entry] : s.entries) stage.own.insert(name.substr(6));
+    if (!draft.materials.empty())
+      for (const auto& [name, entry] : s.entries)
+        if (differs_by_material(name.substr(6))) stage.own.insert(name.substr(6));
     for (const Key& key : keys()) {
       if (!is_stage_key(key)) continue;
       add_default(key, s.entries, context);

@@ -79,7 +79,7 @@ struct Fluid {
 };
 
 struct Stage {
-  std::set<std::string> own;  // keys that it gives itself, "mu_s"
+  std::set<std::string> own;  // with materials: keys of contacts that it gives itself, "mu_s"
   enum class FluidTop { drained, impermeable };
   enum class FluidBottom { no_flow, pressure, flux };
   enum class Kind { settle, consolidate, shear, shear_stress, uniaxial, press };

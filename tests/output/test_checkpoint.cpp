@@ -230,7 +230,7 @@ TEST_F(CheckpointFile, RefusesAnotherFormat) {
 // A checkpoint before it is no help where this version is the wrong one.
 TEST_F(CheckpointFile, CallsOnlyDamageDamage) {
   write_checkpoint(path, sample(2));
-  reseal(9);
+  reseal(10);
   try {
     read_checkpoint(path);
     FAIL();
