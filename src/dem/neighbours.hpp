@@ -184,8 +184,9 @@ struct Neighbours {
   std::int64_t total = 0;
 
   // Throws Error if a coordinate is not finite.
+  // material: of each grain; null where all are of the first.
   void build(const Space& space, const Scene& scene, const GrainRow* grains, const BodyId* part_of, Index n,
-             double margin) {
+             double margin, const Material* material = nullptr) {
     const Cells cells = sort_into_cells(space, scene, grains, n, margin);
     count_.resize(n + 1), row.resize(n + 1);
     search::Rows rows{.levels = cells.levels,
@@ -195,7 +196,7 @@ struct Neighbours {
                       .first = cells.first,
                       .end = cells.end,
                       .margin = margin,
-                      .sum_order = {chunk_size(n)},
+                      .sum_order = {chunk_size(n), material},
                       .count = count_.data()};
     for (int id = 0; id < body_ids; ++id) rows.rigid[id] = scene.is_rigid(static_cast<BodyId>(id));
     space.write(count_.data() + n, std::int64_t{0});
