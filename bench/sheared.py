@@ -170,7 +170,10 @@ zero_kinematics = false
         return self.going_on(f"under-{name}", self.folder / "sheared-1x1", keys, run=True)
 
     def going_on(self, name, bed, keys, wall_keys=(), run=False):
-        """A case that goes on shearing where that of `bed` ended, undamped, with these lines in [contact] and [wall]."""
+        """A case that goes on shearing where that of `bed` ended, undamped, with these lines in [contact] and [wall].
+
+        Walls are smooth: they touch grains of the layers only.
+        """
         lines, at_walls = "\n".join(keys), "\n".join(wall_keys)
         return self._case(f"{name}-1x1", f"""\
 extends = "../{bed.name}"
@@ -189,6 +192,9 @@ name = "shear"
 strain = 0
 duration = {settling if run else 1}
 zero_kinematics = false
+wall_mu = 0
+wall_gamma_n = 0
+wall_gamma_t = 0
 """, run=run)
 
     def case(self, scene, grains=grains_of_bed):

@@ -192,7 +192,7 @@ class Contest:
 
     def case(self, name):
         law = laws[name]
-        return self.beds.going_on(re.sub(r"\W+", "-", name), self.bed(law), law.keys(["mu_s", "mu_d"]), law.keys(["mu_s", "mu_d"]))
+        return self.beds.going_on(re.sub(r"\W+", "-", name), self.bed(law), law.keys(["mu_s", "mu_d"]), ["mu_roll = 0"] if law.rolling else [])
 
     def moraine(self, name):
         out = subprocess.run([str(w) for w in (self.beds.program, "bench", self.case(name), "--steps", self.steps, "--threads", 1, "--backend",
