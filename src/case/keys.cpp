@@ -75,6 +75,34 @@ Key row(string name, string unit, string fallback, string accepts, string meanin
   return {name, type_of<T>(accepts), unit, fallback, accepts, meaning, kinds, set<members...>};
 }
 
+// A number, or a history; of that the member for the number has the largest value.
+template <auto number, auto history>
+void set_load(const Key&, Case&, Stage& s, const Value& value) {
+  const Load* load = std::get_if<Load>(&value);
+  s.*history = load ? load->history : History{};
+  s.*number = load ? load->history.largest() : std::get<double>(value);
+}
+template <auto number, auto history>
+Key load_row(string name, string unit, string accepts, string meaning, string kinds = "") {
+  return {name,    Type::load,
+          unit,    "0",
+          accepts, meaning + "; or a history, see below",
+          kinds,   set_load<number, history>};
+}
+
+// The rows of the sinusoid that is added to a load.
+template <auto amplitude, auto frequency, auto phase>
+std::vector<Key> sinusoid_rows(const string& load, const string& unit, const string& kinds = "") {
+  const string key = "stage." + load;
+  return {
+      // clang-format off
+      row<amplitude>(key + "_amplitude", unit, "0", "", "of a sinusoid added to " + load, kinds),
+      row<frequency>(key + "_frequency", "Hz", "0", ">= 0", "of that sinusoid", kinds),
+      row<phase>(key + "_phase", "rad", "0", "", "of that sinusoid when the stage begins; a stage that asks for the same as the one before goes on with it", kinds),
+      // clang-format on
+  };
+}
+
 Key no_physics(Key key) {
   key.decides = Key::Decides::nothing;
   return key;
@@ -113,6 +141,7 @@ std::vector<Key> make_keys() {
   using F = Fluid;
   constexpr auto fluid = &C::fluid;
   using P = dem::ContactParameters;
+  using E = Elastic;
   constexpr auto contact = &C::contact;
   constexpr auto wall = &C::wall;
   const string sheared = "shear, shear_stress", damped = "; settle, consolidate: ";
@@ -149,22 +178,40 @@ std::vector<Key> make_keys() {
       row<grains, &G::columns_y>("grains.columns_y", "", "10", ">= 1", "lattice cells along y"),
       row<grains, &G::cell>("grains.cell", "1", "2.1", ">= 1.05", "side of a lattice cell in largest grain diameters"),
 
-      row<contact, &P::k_n>("contact.k_n", "N/m", "1.16e9", "> 0", "normal stiffness"),
-      row<contact, &P::k_t>("contact.k_t", "N/m", "1.16e9", ">= 0", "tangential stiffness"),
+      row<&C::law>("contact.law", "", "\"linear\"", "linear | hertz", "linear springs k_n and k_t; or Hertz and Mindlin, of elastic spheres with young and poisson (k_n and k_t then do not count)"),
+      row<contact, &P::k_n>("contact.k_n", "N/m", "1.16e9", "> 0", "normal stiffness of linear springs"),
+      row<contact, &P::k_t>("contact.k_t", "N/m", "1.16e9", ">= 0", "tangential stiffness of linear springs"),
+      row<&C::elastic, &E::young>("contact.young", "Pa", "0", ">= 0", "hertz: Young's modulus"),
+      row<&C::elastic, &E::poisson>("contact.poisson", "1", "0.25", "0 .. 0.5", "hertz: Poisson's ratio"),
+      row<&C::restitution>("contact.restitution", "1", "1", "0.05 .. 1", "coefficient of restitution of two grains, by damping of the normal direction beside gamma_n; 1: none; a stage may have its own"),
       row<contact, &P::gamma_n>("contact.gamma_n", "N s/m", "0", ">= 0", "normal viscosity; a stage may have its own"),
       row<contact, &P::gamma_t>("contact.gamma_t", "N s/m", "0", ">= 0", "tangential viscosity; a stage may have its own"),
       row<contact, &P::mu_s>("contact.mu_s", "1", "0.3", ">= 0", "static friction; a stage may have its own"),
       row<contact, &P::mu_d>("contact.mu_d", "1", "contact.mu_s", ">= 0", "dynamic friction, at most mu_s; a stage may have its own"),
+      row<contact, &P::mu_roll>("contact.mu_roll", "1", "0", ">= 0", "resistance to rolling, of grains that are not round: the couple is at most mu_roll R f_n, 1/R = 1/r_i + 1/r_j; 0: none"),
+      row<contact, &P::k_roll>("contact.k_roll", "N/m", "contact.k_t", ">= 0", "stiffness against rolling before that, as a force at R"),
+      row<contact, &P::mu_twist>("contact.mu_twist", "1", "0", ">= 0", "resistance to twisting about the normal: the couple is at most mu_twist R f_n; 0: none"),
+      row<contact, &P::k_twist>("contact.k_twist", "N/m", "contact.k_roll", ">= 0", "stiffness against twisting before that, as a force at R"),
+      row<contact, &P::cohesion>("contact.cohesion", "N", "0", ">= 0", "constant pull of grains that touch, which friction does not see"),
 
       row<wall, &P::k_t>("wall.k_t", "N/m", "0", ">= 0", "tangential stiffness against walls; k_n is that of contacts"),
+      row<&C::wall_elastic, &E::young>("wall.young", "Pa", "contact.young", ">= 0", "hertz: Young's modulus of walls; slip at walls takes wall_mu"),
+      row<&C::wall_elastic, &E::poisson>("wall.poisson", "1", "contact.poisson", "0 .. 0.5", "hertz: Poisson's ratio of walls"),
+      row<&C::wall_restitution>("wall.restitution", "1", "1", "0.05 .. 1", "coefficient of restitution against walls, by damping beside their gamma_n; a stage may have its own"),
+      row<wall, &P::mu_roll>("wall.mu_roll", "1", "0", ">= 0", "resistance to rolling on walls, R = r"),
+      row<wall, &P::k_roll>("wall.k_roll", "N/m", "contact.k_roll", ">= 0", "stiffness against rolling on walls"),
+      row<wall, &P::mu_twist>("wall.mu_twist", "1", "0", ">= 0", "resistance to twisting on walls"),
+      row<wall, &P::k_twist>("wall.k_twist", "N/m", "wall.k_roll", ">= 0", "stiffness against twisting on walls"),
+      row<wall, &P::cohesion>("wall.cohesion", "N", "0", ">= 0", "constant pull of walls on grains that touch them"),
       row<&C::wall_mass>("wall.mass", "kg", "0", ">= 0", "of the top wall; 0: 0.001 of the mass of N spheres as wide as a lattice cell"),
       row<wall, &P::gamma_n>("wall.gamma_n", "N s/m", "1e4", ">= 0", "normal viscosity against walls while settling and consolidating; a stage may have its own"),
       row<wall, &P::gamma_t>("wall.gamma_t", "N s/m", "1e4", ">= 0", "tangential viscosity against walls, likewise"),
 
-      row<&C::gravity>("model.gravity", "m/s2", "9.80665", ">= 0", "along -z"),
+      row<&C::gravity>("model.gravity", "m/s2", "9.80665", ">= 0", "along -z; see slope"),
+      row<&C::slope>("model.slope", "rad", "0", "-1.57 .. 1.57", "of the ground, falling towards +x: gravity acts along (sin, 0, -cos) of it; x stays along the bed and z at right angles to it"),
       row<&C::density_scaling>("model.density_scaling", "m", "0", ">= 0", "density scaling by size, for a longer step: radii below this have the inertia of this one, and their own weight; 0: none"),
       row<&C::preset>("model.preset", "", "\"none\"", "none | paper | standard | fast", "accuracy against time: sets f, softening and the walls' viscosity where the case does not; see below"),
-      row<&C::softening>("model.softening", "1", "1", ">= 1", "k_n and k_t of grains and walls are divided by it; viscosities are not"),
+      row<&C::softening>("model.softening", "1", "1", ">= 1", "stiffnesses of grains and walls (k_n, k_t, young, k_roll, k_twist) are divided by it; viscosities are not"),
       {"model.f", Type::number, "1", "0.075", "> 0", "time step in units of sqrt(min m / max(k_n, k_t)), eq. 9; a stage may have its own", "", set_nothing},
       {"model.dt", Type::number, "s", "0", ">= 0 | auto", "time step; 0: by f; \"auto\": safety times the critical step of the present contact network", "", set_dt},
       row<&C::safety>("model.safety", "1", "0.5", "0.01 .. 1", "dt = \"auto\": share of the critical step"),
@@ -193,20 +240,36 @@ std::vector<Key> make_keys() {
   append(table, side_rows<&F::x_high>("x_high", "x = box.x"));
   append(table, side_rows<&F::y_low>("y_low", "y = 0"));
   append(table, side_rows<&F::y_high>("y_high", "y = box.y"));
-  const std::vector<Key> of_stages_and_output{
+  std::vector<Key> of_stages{
       // clang-format off
       row<&S::name>("stage.name", "", required, "", "unique; letters, digits, - and _"),
       row<&S::kind>("stage.kind", "", required, "settle | consolidate | shear | shear_stress | uniaxial | press", "what is done to the bed"),
       row<&S::duration>("stage.duration", "s", "0", ">= 0", "of the stage; this, strain or porosity"),
       row<&S::strain>("stage.strain", "1", "0", ">= 0", "where the stage ends: u t/H_0, or axial; magnitude", "shear, uniaxial"),
       row<&S::top_wall>("stage.top_wall", "", "\"automatic\"", "automatic | stress | fixed | none", "automatic: none to settle or press, driven in uniaxial, else stress"),
-      row<&S::normal_stress>("stage.normal_stress", "Pa", "0", ">= 0", "on the top wall"),
-      row<&S::normal_stress_amplitude>("stage.normal_stress_amplitude", "Pa", "0", "", "of a sinusoid added to normal_stress"),
-      row<&S::normal_stress_frequency>("stage.normal_stress_frequency", "Hz", "0", ">= 0", "of that sinusoid"),
-      row<&S::normal_stress_phase>("stage.normal_stress_phase", "rad", "0", "", "of that sinusoid when the stage begins; a stage that asks for the same as the one before goes on with it"),
-      row<&S::velocity>("stage.velocity", "m/s", "0", "", "of the top layer; this or strain_rate", "shear"),
+      load_row<&S::normal_stress, &S::normal_stress_history>("stage.normal_stress", "Pa", ">= 0", "on the top wall"),
+      // clang-format on
+  };
+  append(of_stages,
+         sinusoid_rows<&S::normal_stress_amplitude, &S::normal_stress_frequency, &S::normal_stress_phase>(
+             "normal_stress", "Pa"));
+  of_stages.push_back(load_row<&S::velocity, &S::velocity_history>(
+      "stage.velocity", "m/s", "", "of the top layer; this or strain_rate", "shear"));
+  append(of_stages, sinusoid_rows<&S::velocity_amplitude, &S::velocity_frequency, &S::velocity_phase>(
+                        "velocity", "m/s", "shear"));
+  const std::vector<Key> of_rates{
+      // clang-format off
+      row<&S::profile>("stage.profile", "", "\"uniform\"", "uniform | linear | cosine | half", "of the velocity across y, times that velocity, by where a grain of the layer stands: 1; y/L; (1 - cos(2 pi y/L))/2; or 1 below L/2 and 0 beyond, L = box.y", "shear"),
       row<&S::strain_rate>("stage.strain_rate", "1/s", "0", "", "velocity over H_0, the height of the bed when shear began; axial; or how fast each side of a pressed box shortens, at most", "shear, uniaxial, press"),
-      row<&S::shear_stress>("stage.shear_stress", "Pa", "0", "", "that drives the top layer", "shear_stress"),
+      load_row<&S::shear_stress, &S::shear_stress_history>("stage.shear_stress", "Pa", "", "that drives the top layer", "shear_stress"),
+      // clang-format on
+  };
+  append(of_stages, of_rates);
+  append(of_stages,
+         sinusoid_rows<&S::shear_stress_amplitude, &S::shear_stress_frequency, &S::shear_stress_phase>(
+             "shear_stress", "Pa", "shear_stress"));
+  const std::vector<Key> of_layers_and_water{
+      // clang-format off
       row<&S::porosity>("stage.porosity", "1", "0", "0 .. 0.99", "that a box is pressed to, all sides alike, in place of pressure; or a bed by its wall, in place of duration and strain", "press, uniaxial"),
       row<&S::pressure>("stage.pressure", "Pa", "0", ">= 0", "of the grains on the sides of the box, on each by itself, for the duration of the stage", "press"),
       row<&S::layer_mass>("stage.layer_mass", "kg", "0", ">= 0", "that the shear stress moves besides the layer's grains, such as that of the ice above", "shear_stress"),
@@ -220,17 +283,34 @@ std::vector<Key> make_keys() {
       row<&S::mu_d>("stage.mu_d", "1", "contact.mu_d", ">= 0", "dynamic friction, at most mu_s"),
       row<&S::wall_gamma_n>("stage.wall_gamma_n", "N s/m", "0" + damped + "wall.gamma_n", ">= 0", "normal viscosity against walls"),
       row<&S::wall_gamma_t>("stage.wall_gamma_t", "N s/m", "0" + damped + "wall.gamma_t", ">= 0", "tangential viscosity against walls"),
+      row<&S::restitution>("stage.restitution", "1", "contact.restitution", "0.05 .. 1", "coefficient of restitution of two grains"),
+      row<&S::wall_restitution>("stage.wall_restitution", "1", "wall.restitution", "0.05 .. 1", "coefficient of restitution against walls"),
       row<&S::wall_mu>("stage.wall_mu", "1", "0" + damped + "stage.mu_d", ">= 0", "friction against walls"),
       row<&S::zero_kinematics>("stage.zero_kinematics", "", "true; another of its kind: false", "", "velocities, spins and rotations begin at zero; by default not where the stage before, or the last one of `start`, is of the same kind"),
       row<&S::clear_history>("stage.clear_history", "", "false", "", "tangential springs are forgotten when the stage begins"),
       row<&S::fluid>("stage.fluid", "", "fluid.enabled", "", "pore water in this stage"),
       row<&S::fluid_top>("stage.fluid_top", "", "\"drained\"", "drained | impermeable", "the top: at top_pressure, or tight (then the wall carries the water's pressure)"),
-      row<&S::top_pressure>("stage.top_pressure", "Pa", "0", "", "over hydrostatic, at a drained top"),
-      row<&S::top_pressure_amplitude>("stage.top_pressure_amplitude", "Pa", "0", "", "of a sinusoid added to top_pressure"),
-      row<&S::top_pressure_frequency>("stage.top_pressure_frequency", "Hz", "0", ">= 0", "of that sinusoid"),
-      row<&S::top_pressure_phase>("stage.top_pressure_phase", "rad", "0", "", "of that sinusoid when the stage begins; a stage that asks for the same as the one before goes on with it"),
+      load_row<&S::top_pressure, &S::top_pressure_history>("stage.top_pressure", "Pa", "", "over hydrostatic, at a drained top"),
+      // clang-format on
+  };
+  append(of_stages, of_layers_and_water);
+  append(of_stages,
+         sinusoid_rows<&S::top_pressure_amplitude, &S::top_pressure_frequency, &S::top_pressure_phase>(
+             "top_pressure", "Pa"));
+  const std::vector<Key> of_floor{
+      // clang-format off
       row<&S::fluid_bottom>("stage.fluid_bottom", "", "\"no_flow\"", "no_flow | pressure | flux", "the floor: tight, at bottom_pressure, or with bottom_flux through it"),
-      row<&S::bottom_pressure>("stage.bottom_pressure", "Pa", "0", "", "over hydrostatic, at the floor"),
+      load_row<&S::bottom_pressure, &S::bottom_pressure_history>("stage.bottom_pressure", "Pa", "", "over hydrostatic, at the floor"),
+      // clang-format on
+  };
+  append(of_stages, of_floor);
+  append(
+      of_stages,
+      sinusoid_rows<&S::bottom_pressure_amplitude, &S::bottom_pressure_frequency, &S::bottom_pressure_phase>(
+          "bottom_pressure", "Pa"));
+  append(table, of_stages);
+  const std::vector<Key> of_flux_and_output{
+      // clang-format off
       row<&S::bottom_flux>("stage.bottom_flux", "m/s", "0", "", "Darcy velocity through the floor, upwards"),
 
       records(row<output, &O::series_interval>("output.series_interval", "s", "0.05", "> 0", "of model time")),
@@ -242,7 +322,7 @@ std::vector<Key> make_keys() {
       no_physics(row<guards, &Guards::max_residue>("guards.max_residue", "1", "0.1", "> 0", "energy created or lost over that stored and put in; beyond it the run stops")),
       // clang-format on
   };
-  append(table, of_stages_and_output);
+  append(table, of_flux_and_output);
   return table;
 }
 
@@ -335,6 +415,8 @@ void check_range(const Key& key, const Value& value) {
   if ((number && !in_range(key.accepts, *number)) || (integer && !in_range(key.accepts, double(*integer))))
     throw error("expected ", split(key.accepts, " | ")[0],
                 key.unit.empty() || key.unit == "1" ? "" : " " + key.unit, or_word(key));
+  if (const Load* load = std::get_if<Load>(&value))
+    for (const double one : load->history.value) check_range(key, one);
 }
 
 string suggestion(const string& unknown_key, const string& shown) {
@@ -380,6 +462,7 @@ string join(const std::vector<string>& parts, const string& separator) {
 
 string to_toml(const Value& value) {
   if (const auto* text = std::get_if<string>(&value)) return quoted(*text);
+  if (const auto* load = std::get_if<Load>(&value)) return to_toml(*load);
   if (const auto* flag = std::get_if<bool>(&value)) return *flag ? "true" : "false";
   if (const auto* integer = std::get_if<std::int64_t>(&value)) return std::to_string(*integer);
   if (const auto* list = std::get_if<std::vector<string>>(&value)) {
@@ -401,10 +484,11 @@ string reference(const std::vector<string>& words) {
       "The keys of case.toml: name, default and unit, meaning, (what is accepted), [kinds of stage].\n"
       "A value is a number in SI units or a text with a unit, such as \"80 kPa\".\n";
   string table = "none yet";
-  bool found = false, with_presets = words.empty();
+  bool found = false, with_presets = words.empty(), with_loads = words.empty();
   for (const Key& key : keys()) {
     if (!is_about(key, words)) continue;
     found = true, with_presets = with_presets || key.name == "model.preset";
+    with_loads = with_loads || key.type == Type::load;
     if (key.table() != table) {
       table = key.table();
       const string name = table.substr(0, table.find('.'));
@@ -414,7 +498,7 @@ string reference(const std::vector<string>& words) {
            key.meaning + (key.accepts.empty() ? "" : " (" + key.accepts + ")") +
            (key.kinds.empty() ? "" : " [" + key.kinds + "]") + "\n";
   }
-  if (found) return out + (with_presets ? preset_reference() : "");
+  if (found) return out + (with_loads ? load_reference() : "") + (with_presets ? preset_reference() : "");
   std::vector<string> names;
   for (const Key& key : keys()) {
     names.push_back(leaf(key.name));
