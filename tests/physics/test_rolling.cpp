@@ -1,8 +1,6 @@
 // Resistance to rolling, known answers. Contact is at the lever arm l = r - overlap/2; the couple is at most
 // R mu_roll f_n, R = r at a plane.
 #include "backends.hpp"
-#include "dem/body/plane_contact.hpp"
-#include "dem/leapfrog.hpp"
 #include "physics/scenes.hpp"
 
 namespace moraine::dem {
@@ -62,52 +60,42 @@ TEST_P(RollingOnFloor, TwistingStopsASpinAboutTheNormal) {
 }
 
 // On a slope tan(theta) the weight turns the grain about its contact with m g sin(theta) l, the couple holds
-// it with r mu_roll m g cos(theta) at most: it stands up to tan(theta) = mu_roll r/l. Beyond, it rolls with
-// a = (g sin(theta) - mu_roll g cos(theta) r/l)/(1 + 0.4 r^2/l^2). The plane stays level here and gravity
-// leans, in a step made of the program's own wall contact and leapfrog.
-struct Incline {
-  double way, acceleration;  // m, m/s2, once gravity leans in full
+// it with r mu_roll m g cos(theta) at most: it stands up to tan(theta) = mu_roll r/l. Beyond, it rolls with a
+// = (g sin(theta) - mu_roll g cos(theta) r/l)/(1 + 0.4 r^2/l^2).
+struct LetGo {
+  double way, acceleration;  // m, m/s2, once the slope has its angle
 };
-Incline let_go(double tangent, double mu_roll, double k) {
+LetGo let_go(Engine& engine, double tangent, double mu_roll, double k) {
   const double theta = std::atan(tangent);
   Scene s = on_floor(k, 1, mu_roll);
-  s.gravity = g * std::cos(theta);
-  const double m = mass(s, r), normal = m * s.gravity, sunk = normal / k;
-  const Mobility mobility_of = mobility(s, r, BodyId::none);
-  const Triple dt(Vec3d{s.dt, s.dt, s.dt});
-  const Plane floor{.id = BodyId::floor};
-  GrainRow grain{{0, 0, r - sunk}, r, {0, 0, 0}, r, {0, 0, 0}, 0, {}, 0};
-  Spring<double> spring;
-  Vec3d f{0, 0, normal}, torque{0, 0, 0}, rotation{0, 0, 0};
-  const int steps = 20000, slowly = 10000;  // gravity begins to lean slowly, lest the grain swings
+  const Vec3d start{0.5, 0.5, r - mass(s, r) * g / k};
+  State now = grains_at_rest({r}, {start});
   double before = 0;
-  for (int step = 0; step < steps; ++step) {
-    const double leans = std::min(1.0, static_cast<double>(step) / slowly);
-    const Triple a(mobility_of.acceleration(f) + Vec3d{leans * g * std::sin(theta), 0, 0});
-    Kinematics<Triple> kinematics{grain.x, grain.v, grain.omega, rotation};
-    leapfrog(kinematics, a, Triple(mobility_of.spin_acceleration(torque)), dt);
-    grain.x = kinematics.x, grain.v = kinematics.v, grain.omega = kinematics.omega;
-    const auto action = plane_action<GeneralLaw, Account::energy>(s, s.dt, floor, grain, spring);
-    f = action.f, torque = action.torque;
-    if (step < slowly) before = grain.v.x;
+  for (int part = 1; part <= 100; ++part) {  // it leans over slowly, lest the grain swings
+    const double lean = theta * part / 100;
+    s.down = {std::sin(lean), 0, -std::cos(lean)};
+    before = now.v[0].x;
+    now = run(engine, s, now, part < 100 ? 100 : 10000);
+    synchronise(s, now);
   }
-  return {grain.x.x, (grain.v.x - before) / ((steps - slowly) * s.dt)};
+  return {now.x[0].x - start.x, (now.v[0].x - before) / (10000 * s.dt)};
 }
 
-TEST(RollingOnASlope, StopsBelowRollsAbove) {
+TEST_P(RollingOnFloor, StandsOnASlopeUpToItsAngle) {
+  const auto engine = make();
   const double k = 1e6, weight = mass(on_floor(k, 1, 0), r) * g;
   for (const double mu_roll : {0.05, 0.3}) {
-    const auto ratio = [&](double tangent) {
+    const auto ratio = [&](double tangent) {  // r/l
       return 1 / (1 - 0.5 * weight / std::hypot(1, tangent) / k / r);
-    };  // r/l
+    };
     const double steepest = mu_roll * ratio(mu_roll);
-    EXPECT_LT(std::abs(let_go(0.999 * steepest, mu_roll, k).way), 10 * weight / k)
-        << mu_roll;  // springs yield so much
+    // What its springs yield.
+    EXPECT_LT(std::abs(let_go(*engine, 0.999 * steepest, mu_roll, k).way), 10 * weight / k) << mu_roll;
     for (const double tangent : {1.01 * steepest, 1.5 * steepest}) {
       const double theta = std::atan(tangent), q = ratio(tangent);
       const double a = (g * std::sin(theta) - mu_roll * g * std::cos(theta) * q) / (1 + 0.4 * q * q);
       // Springs without dampers go on rocking a little.
-      EXPECT_NEAR(let_go(tangent, mu_roll, k).acceleration, a, 1e-4 * g * mu_roll) << mu_roll;
+      EXPECT_NEAR(let_go(*engine, tangent, mu_roll, k).acceleration, a, 1e-4 * g * mu_roll) << mu_roll;
     }
   }
 }
