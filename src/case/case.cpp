@@ -54,7 +54,18 @@ void add_default(const Key& key, Entries& entries, const Context& context) {
 class Reader {
  public:
   explicit Reader(const Entries& entries) : entries_(entries) {}
-  double number(const string& key) const { return std::get<double>(entries_.at(key).value); }
+  // Of a load that changes, the largest value.
+  double number(const string& key) const {
+    const History* h = history(key);
+    return h ? h->largest() : std::get<double>(entries_.at(key).value);
+  }
+  double least(const string& key) const { return history(key) ? history(key)->least() : number(key); }
+  // Of a load; null: it does not change.
+  const History* history(const string& key) const {
+    const Load* load = std::get_if<Load>(&entries_.at(key).value);
+    return load ? &load->history : nullptr;
+  }
+  const string& stated(const string& key) const { return entries_.at(key).stated; }
   string text(const string& key) const { return std::get<string>(entries_.at(key).value); }
   bool flag(const string& key) const { return std::get<bool>(entries_.at(key).value); }
   bool automatic_dt() const { return std::holds_alternative<string>(entries_.at("model.dt").value); }
@@ -117,6 +128,26 @@ void check_case(const Entries& entries) {
   }
 }
 
+// What holds for any load of a stage. `duration`: s, 0 where it is not known yet.
+void check_loads(const Reader& s, double duration) {
+  for (const Key& key : keys()) {
+    if (key.type != Key::Type::load) continue;
+    const History* h = s.history(key.name);
+    if (h && !h->covers(duration))
+      throw error(s.stated(key.name), ": ends at ", h->time.back(), " s and the stage at ", duration,
+                  " s; expected values up to there, or a shorter stage");
+    s.expect(s.number(key.name + "_amplitude") == 0 || s.number(key.name + "_frequency") > 0,
+             key.name + "_frequency", "> 0 Hz with an amplitude");
+  }
+}
+
+// s; 0 where the height of the bed decides.
+double duration_of(const Reader& s) {
+  const double rate = std::abs(s.number("stage.strain_rate"));
+  return s.number("stage.strain") > 0 && rate > 0 ? s.number("stage.strain") / rate
+                                                  : s.number("stage.duration");
+}
+
 void check_water(const Reader& s, const Reader& above, bool no_wall) {
   const bool tight = s.text("stage.fluid_top") == "impermeable";
   const string bottom = s.text("stage.fluid_bottom");
@@ -124,10 +155,8 @@ void check_water(const Reader& s, const Reader& above, bool no_wall) {
     s.expect(!tight || s.number(key) == 0, key, "0 Pa: the top is impermeable");
   for (const char* key : {"stage.top_pressure_frequency", "stage.top_pressure_phase"})
     s.expect(!tight || s.number(key) == 0, key, "0: the top is impermeable");
-  s.expect(s.number("stage.top_pressure_amplitude") == 0 || s.number("stage.top_pressure_frequency") > 0,
-           "stage.top_pressure_frequency", "> 0 Hz with an amplitude");
-  s.expect(bottom == "pressure" || s.number("stage.bottom_pressure") == 0, "stage.bottom_pressure",
-           "0 Pa, or fluid_bottom = \"pressure\"");
+  for (const char* key : {"stage.bottom_pressure", "stage.bottom_pressure_amplitude"})
+    s.expect(bottom == "pressure" || s.number(key) == 0, key, "0 Pa, or fluid_bottom = \"pressure\"");
   s.expect(bottom == "flux" || s.number("stage.bottom_flux") == 0, "stage.bottom_flux",
            "0 m/s, or fluid_bottom = \"flux\"");
   if (!s.flag("stage.fluid")) {
@@ -137,6 +166,8 @@ void check_water(const Reader& s, const Reader& above, bool no_wall) {
              "stage.top_pressure", "0 Pa: there is no pore water in this stage");
     return;
   }
+  s.expect(above.number("model.slope") == 0, "stage.fluid",
+           "false on a slope: pressures are over the hydrostatic one of level ground (model.slope)");
   s.expect(!(tight && no_wall), "stage.fluid_top", "drained: there is no top wall to be impermeable");
   s.expect(above.text("box.periodic").find('z') == string::npos, "stage.fluid",
            "false where z is periodic: water needs a bottom and a top");
@@ -180,14 +211,18 @@ void check_stage(const Entries& entries, const Entries& above, const Context& co
              kind == "shear" || kind == "uniaxial" ? "either duration or strain" : "a duration > 0 s");
   }
   if (kind == "shear") {
-    const bool by_rate = s.number("stage.strain_rate") != 0;
-    s.expect(by_rate != (s.number("stage.velocity") != 0), by_rate ? "stage.strain_rate" : "stage.velocity",
-             "either velocity or strain_rate");
+    const bool by_rate = s.number("stage.strain_rate") != 0,
+               swings = s.number("stage.velocity_amplitude") != 0;
+    s.expect(by_rate != (s.number("stage.velocity") != 0 || swings),
+             by_rate ? "stage.strain_rate" : "stage.velocity", "either velocity or strain_rate");
+    s.expect(!by_strain || !(swings || s.history("stage.velocity")), "stage.strain",
+             "a duration: the velocity changes");
   }
   if (kind == "uniaxial")
     s.expect(s.number("stage.strain_rate") != 0, "stage.strain_rate", "other than 0 1/s");
   if (kind == "shear_stress")
-    s.expect(s.number("stage.shear_stress") != 0, "stage.shear_stress", "other than 0 Pa");
+    s.expect(s.number("stage.shear_stress") != 0 || s.number("stage.shear_stress_amplitude") != 0,
+             "stage.shear_stress", "other than 0 Pa");
 
   if (kind == "shear" || kind == "shear_stress")
     Reader(above).expect(Reader(above).text("box.walls").find('x') == string::npos, "box.walls",
@@ -208,15 +243,16 @@ void check_stage(const Entries& entries, const Entries& above, const Context& co
     s.expect(amplitude == 0, "stage.normal_stress_amplitude",
              "0 Pa: no stress drives the top wall of this stage");
   }
-  s.expect(std::abs(amplitude) <= normal_stress, "stage.normal_stress_amplitude",
-           "at most normal_stress = ", normal_stress, " Pa: the wall cannot pull");
-  if (amplitude != 0)
-    s.expect(s.number("stage.normal_stress_frequency") > 0, "stage.normal_stress_frequency",
-             "> 0 Hz with an amplitude");
+  const double least = s.least("stage.normal_stress");
+  s.expect(
+      std::abs(amplitude) <= least, "stage.normal_stress_amplitude",
+      s.history("stage.normal_stress") ? "at most the least normal_stress = " : "at most normal_stress = ",
+      least, " Pa: the wall cannot pull");
   if (Reader(above).text("box.periodic").find('z') != string::npos)
     s.expect(no_wall, "stage.top_wall", "none where z is periodic");
 
   check_water(s, Reader(above), no_wall);
+  check_loads(s, duration_of(s));
   s.expect(s.number("stage.mu_d") <= s.number("stage.mu_s"), "stage.mu_d",
            "at most mu_s = ", s.number("stage.mu_s"));
 }
@@ -240,14 +276,23 @@ fs::path start_file(const fs::path& directory, const Entry& entry) {
 }
 
 // A file beside the case.
-fs::path file_beside(const fs::path& directory, const Entry& entry) {
-  const string name = std::get<string>(entry.value);
+fs::path file_beside(const fs::path& directory, const Entry& entry, const string& name) {
   if (name.empty()) return {};
   const fs::path path = (directory / name).lexically_normal();
   if (!fs::is_regular_file(path))
     throw error(entry.stated, ": there is no ", path.string(), "; expected a file, relative to ",
                 directory.string());
   return path;
+}
+
+// Fills in the history of a load that comes from a file, which the case then knows of.
+void read_table_of(const Key& key, Entry& entry, Case& c) {
+  Load* const load = std::get_if<Load>(&entry.value);
+  if (!load || load->form != Load::Form::table) return;
+  const fs::path file = file_beside(c.directory, entry, load->table);
+  load->history =
+      read_table(file, key.unit, load->history.between, [&](double value) { check_range(key, value); });
+  if (std::find(c.tables.begin(), c.tables.end(), file) == c.tables.end()) c.tables.push_back(file);
 }
 
 // The kind of the last stage of the case that a start file comes from; empty where that is not known.
@@ -315,7 +360,8 @@ Case load_checked(const fs::path& directory, const std::vector<Override>& overri
   c.wall.k_n = c.contact.k_n;
   check_case(draft.entries);
   c.start = start_file(directory, draft.entries.at("start"));
-  c.grains.sieves = file_beside(directory, draft.entries.at("grains.sieves"));
+  const Entry& sieves = draft.entries.at("grains.sieves");
+  c.grains.sieves = file_beside(directory, sieves, std::get<string>(sieves.value));
 
   if (draft.stages.empty()) throw error(file, ": no stages; expected at least one [[stage]]");
   string kind_before = last_kind(c.start);
@@ -327,6 +373,7 @@ Case load_checked(const fs::path& directory, const std::vector<Override>& overri
     for (const Key& key : keys()) {
       if (!is_stage_key(key)) continue;
       add_default(key, s.entries, context);
+      read_table_of(key, s.entries.at(key.name), c);
       key.set(key, c, stage, s.entries.at(key.name).value);
     }
     check_stage(s.entries, draft.entries, context);
@@ -339,6 +386,10 @@ Case load_checked(const fs::path& directory, const std::vector<Override>& overri
 
 bool Case::has_water() const {
   return std::any_of(stages.begin(), stages.end(), [](const Stage& s) { return s.fluid; });
+}
+
+bool Case::has_histories() const {
+  return std::any_of(stages.begin(), stages.end(), [](const Stage& s) { return s.has_histories(); });
 }
 
 bool Case::presses() const {
@@ -386,15 +437,19 @@ string extension_text(const fs::path& directory, const std::vector<Override>& ov
   };
   keep_overrides(draft.entries);
   // A path keeps its meaning in the other directory.
+  const auto from_there = [&](string& path) {
+    if (!path.empty()) path = (fs::path(base) / path).lexically_normal().string();
+  };
   for (const char* key : {"start", "grains.sieves"})
     if (const auto entry = draft.entries.find(key); entry != draft.entries.end())
-      if (auto& path = std::get<string>(entry->second.value); !path.empty())
-        path = (fs::path(base) / path).lexically_normal().string();
+      from_there(std::get<string>(entry->second.value));
   std::vector<string> stages;
   for (StageDraft& stage : draft.stages) {
     stages.push_back(stage.name);
     const Entry name = stage.entries.at("stage.name");
     keep_overrides(stage.entries);
+    for (auto& [key, entry] : stage.entries)
+      if (Load* load = std::get_if<Load>(&entry.value)) from_there(load->table);
     if (!stage.entries.empty()) stage.entries["stage.name"] = name;
   }
   std::erase_if(draft.stages, [](const StageDraft& stage) { return stage.entries.empty(); });

@@ -8,6 +8,7 @@
 
 #include "dem/scene.hpp"
 #include "dem/state.hpp"
+#include "history.hpp"
 
 namespace moraine::cases {
 
@@ -67,18 +68,25 @@ struct Stage {
   enum class TopWall { automatic, stress, fixed, none };
   std::string name;
   Kind kind;
-  double duration;       // s; 0 where `strain` is given
-  double strain;         // shear strain u t/H_0, or axial strain for uniaxial; 0 where `duration` is given
-  TopWall top_wall;      // automatic: none for settle and press, prescribed for uniaxial, else stress
+  double duration;   // s; 0 where `strain` is given
+  double strain;     // shear strain u t/H_0, or axial strain for uniaxial; 0 where `duration` is given
+  TopWall top_wall;  // automatic: none for settle and press, prescribed for uniaxial, else stress
+  // Loads. Where one follows a history, which is empty else, the number is the largest value.
   double normal_stress;  // Pa
+  History normal_stress_history;
   double normal_stress_amplitude, normal_stress_frequency, normal_stress_phase;  // Pa, Hz, rad
-  double velocity;     // m/s, of the top layer; 0 where strain_rate is given
+  double velocity;  // m/s, of the top layer; 0 where strain_rate is given
+  History velocity_history;
+  double velocity_amplitude, velocity_frequency, velocity_phase;  // m/s, Hz, rad
+  dem::Profile profile;                                           // of the velocity across y
   double strain_rate;  // 1/s; times the bed height gives the velocity (shear), axial (uniaxial), of each side
                        // (press)
   double shear_stress;  // Pa, for shear_stress
-  double porosity;      // 1, that a press or a uniaxial stage ends with; 0 where something else ends it
-  double pressure;      // Pa, of a press, on all sides of the box; 0 where porosity is given
-  double layer_mass;    // kg, that the shear stress moves besides the grains of the layer
+  History shear_stress_history;
+  double shear_stress_amplitude, shear_stress_frequency, shear_stress_phase;  // Pa, Hz, rad
+  double porosity;    // 1, that a press or a uniaxial stage ends with; 0 where something else ends it
+  double pressure;    // Pa, of a press, on all sides of the box; 0 where porosity is given
+  double layer_mass;  // kg, that the shear stress moves besides the grains of the layer
   double bottom_layer, top_layer;  // m, thickness by grain centres; negative: one largest diameter
   bool hold_layer_height;
   double f;                           // eq. 9
@@ -90,10 +98,20 @@ struct Stage {
   bool clear_history;    // tangential springs forgotten when the stage begins
   bool fluid;            // pore water in this stage
   FluidTop fluid_top;
-  double top_pressure, top_pressure_amplitude, top_pressure_frequency, top_pressure_phase;  // Pa, Hz, rad
+  double top_pressure;  // Pa
+  History top_pressure_history;
+  double top_pressure_amplitude, top_pressure_frequency, top_pressure_phase;  // Pa, Hz, rad
   FluidBottom fluid_bottom;
   double bottom_pressure;  // Pa
-  double bottom_flux;      // m/s, upwards into the bed
+  History bottom_pressure_history;
+  double bottom_pressure_amplitude, bottom_pressure_frequency, bottom_pressure_phase;  // Pa, Hz, rad
+  double bottom_flux;  // m/s, upwards into the bed
+
+  bool has_histories() const {
+    return normal_stress_history.is_there() || velocity_history.is_there() ||
+           shear_stress_history.is_there() || top_pressure_history.is_there() ||
+           bottom_pressure_history.is_there();
+  }
   bool operator==(const Stage&) const = default;
 };
 
@@ -129,6 +147,7 @@ struct Case {
   dem::ContactParameters contact, wall;
   double wall_mass;         // kg; 0: 0.001 of the mass of N spheres as wide as a lattice cell
   double gravity;           // m/s2
+  double slope;             // rad, of the ground, down towards +x
   double density_scaling;   // m, smaller radii have the inertia of this one; 0: none
   double dt;                // s; 0: by eq. 9
   bool automatic_dt;        // dt follows the contact network instead
@@ -140,9 +159,12 @@ struct Case {
   Output output;
   Guards guards;
 
-  bool has_water() const;  // in any stage
-  bool presses() const;    // in any stage
-  std::string resolved;    // the merged case.toml, SI numbers, ready to be written and read again
+  bool has_water() const;      // in any stage
+  bool presses() const;        // in any stage
+  bool has_histories() const;  // in any stage
+  // Tables that loads come from, in the order of stages and keys.
+  std::vector<std::filesystem::path> tables;
+  std::string resolved;  // the merged case.toml, SI numbers, ready to be written and read again
   bool operator==(const Case&) const = default;
 };
 

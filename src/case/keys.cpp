@@ -75,6 +75,34 @@ Key row(string name, string unit, string fallback, string accepts, string meanin
   return {name, type_of<T>(accepts), unit, fallback, accepts, meaning, kinds, set<members...>};
 }
 
+// A number, or a history; of that the member for the number has the largest value.
+template <auto number, auto history>
+void set_load(const Key&, Case&, Stage& s, const Value& value) {
+  const Load* load = std::get_if<Load>(&value);
+  s.*history = load ? load->history : History{};
+  s.*number = load ? load->history.largest() : std::get<double>(value);
+}
+template <auto number, auto history>
+Key load_row(string name, string unit, string accepts, string meaning, string kinds = "") {
+  return {name,    Type::load,
+          unit,    "0",
+          accepts, meaning + "; or a history, see below",
+          kinds,   set_load<number, history>};
+}
+
+// The rows of the sinusoid that is added to a load.
+template <auto amplitude, auto frequency, auto phase>
+std::vector<Key> sinusoid_rows(const string& load, const string& unit, const string& kinds = "") {
+  const string key = "stage." + load;
+  return {
+      // clang-format off
+      row<amplitude>(key + "_amplitude", unit, "0", "", "of a sinusoid added to " + load, kinds),
+      row<frequency>(key + "_frequency", "Hz", "0", ">= 0", "of that sinusoid", kinds),
+      row<phase>(key + "_phase", "rad", "0", "", "of that sinusoid when the stage begins; a stage that asks for the same as the one before goes on with it", kinds),
+      // clang-format on
+  };
+}
+
 Key no_physics(Key key) {
   key.decides = Key::Decides::nothing;
   return key;
@@ -161,7 +189,8 @@ std::vector<Key> make_keys() {
       row<wall, &P::gamma_n>("wall.gamma_n", "N s/m", "1e4", ">= 0", "normal viscosity against walls while settling and consolidating; a stage may have its own"),
       row<wall, &P::gamma_t>("wall.gamma_t", "N s/m", "1e4", ">= 0", "tangential viscosity against walls, likewise"),
 
-      row<&C::gravity>("model.gravity", "m/s2", "9.80665", ">= 0", "along -z"),
+      row<&C::gravity>("model.gravity", "m/s2", "9.80665", ">= 0", "along -z; see slope"),
+      row<&C::slope>("model.slope", "rad", "0", "-1.57 .. 1.57", "of the ground, falling towards +x: gravity acts along (sin, 0, -cos) of it; x stays along the bed and z at right angles to it"),
       row<&C::density_scaling>("model.density_scaling", "m", "0", ">= 0", "density scaling by size, for a longer step: radii below this have the inertia of this one, and their own weight; 0: none"),
       row<&C::preset>("model.preset", "", "\"none\"", "none | paper | standard | fast", "accuracy against time: sets f, softening and the walls' viscosity where the case does not; see below"),
       row<&C::softening>("model.softening", "1", "1", ">= 1", "k_n and k_t of grains and walls are divided by it; viscosities are not"),
@@ -193,20 +222,36 @@ std::vector<Key> make_keys() {
   append(table, side_rows<&F::x_high>("x_high", "x = box.x"));
   append(table, side_rows<&F::y_low>("y_low", "y = 0"));
   append(table, side_rows<&F::y_high>("y_high", "y = box.y"));
-  const std::vector<Key> of_stages_and_output{
+  std::vector<Key> of_stages{
       // clang-format off
       row<&S::name>("stage.name", "", required, "", "unique; letters, digits, - and _"),
       row<&S::kind>("stage.kind", "", required, "settle | consolidate | shear | shear_stress | uniaxial | press", "what is done to the bed"),
       row<&S::duration>("stage.duration", "s", "0", ">= 0", "of the stage; this, strain or porosity"),
       row<&S::strain>("stage.strain", "1", "0", ">= 0", "where the stage ends: u t/H_0, or axial; magnitude", "shear, uniaxial"),
       row<&S::top_wall>("stage.top_wall", "", "\"automatic\"", "automatic | stress | fixed | none", "automatic: none to settle or press, driven in uniaxial, else stress"),
-      row<&S::normal_stress>("stage.normal_stress", "Pa", "0", ">= 0", "on the top wall"),
-      row<&S::normal_stress_amplitude>("stage.normal_stress_amplitude", "Pa", "0", "", "of a sinusoid added to normal_stress"),
-      row<&S::normal_stress_frequency>("stage.normal_stress_frequency", "Hz", "0", ">= 0", "of that sinusoid"),
-      row<&S::normal_stress_phase>("stage.normal_stress_phase", "rad", "0", "", "of that sinusoid when the stage begins; a stage that asks for the same as the one before goes on with it"),
-      row<&S::velocity>("stage.velocity", "m/s", "0", "", "of the top layer; this or strain_rate", "shear"),
+      load_row<&S::normal_stress, &S::normal_stress_history>("stage.normal_stress", "Pa", ">= 0", "on the top wall"),
+      // clang-format on
+  };
+  append(of_stages,
+         sinusoid_rows<&S::normal_stress_amplitude, &S::normal_stress_frequency, &S::normal_stress_phase>(
+             "normal_stress", "Pa"));
+  of_stages.push_back(load_row<&S::velocity, &S::velocity_history>(
+      "stage.velocity", "m/s", "", "of the top layer; this or strain_rate", "shear"));
+  append(of_stages, sinusoid_rows<&S::velocity_amplitude, &S::velocity_frequency, &S::velocity_phase>(
+                        "velocity", "m/s", "shear"));
+  const std::vector<Key> of_rates{
+      // clang-format off
+      row<&S::profile>("stage.profile", "", "\"uniform\"", "uniform | linear | cosine | half", "of the velocity across y, times that velocity, by where a grain of the layer stands: 1; y/L; (1 - cos(2 pi y/L))/2; or 1 below L/2 and 0 beyond, L = box.y", "shear"),
       row<&S::strain_rate>("stage.strain_rate", "1/s", "0", "", "velocity over H_0, the height of the bed when shear began; axial; or how fast each side of a pressed box shortens, at most", "shear, uniaxial, press"),
-      row<&S::shear_stress>("stage.shear_stress", "Pa", "0", "", "that drives the top layer", "shear_stress"),
+      load_row<&S::shear_stress, &S::shear_stress_history>("stage.shear_stress", "Pa", "", "that drives the top layer", "shear_stress"),
+      // clang-format on
+  };
+  append(of_stages, of_rates);
+  append(of_stages,
+         sinusoid_rows<&S::shear_stress_amplitude, &S::shear_stress_frequency, &S::shear_stress_phase>(
+             "shear_stress", "Pa", "shear_stress"));
+  const std::vector<Key> of_layers_and_water{
+      // clang-format off
       row<&S::porosity>("stage.porosity", "1", "0", "0 .. 0.99", "that a box is pressed to, all sides alike, in place of pressure; or a bed by its wall, in place of duration and strain", "press, uniaxial"),
       row<&S::pressure>("stage.pressure", "Pa", "0", ">= 0", "of the grains on the sides of the box, on each by itself, for the duration of the stage", "press"),
       row<&S::layer_mass>("stage.layer_mass", "kg", "0", ">= 0", "that the shear stress moves besides the layer's grains, such as that of the ice above", "shear_stress"),
@@ -225,12 +270,27 @@ std::vector<Key> make_keys() {
       row<&S::clear_history>("stage.clear_history", "", "false", "", "tangential springs are forgotten when the stage begins"),
       row<&S::fluid>("stage.fluid", "", "fluid.enabled", "", "pore water in this stage"),
       row<&S::fluid_top>("stage.fluid_top", "", "\"drained\"", "drained | impermeable", "the top: at top_pressure, or tight (then the wall carries the water's pressure)"),
-      row<&S::top_pressure>("stage.top_pressure", "Pa", "0", "", "over hydrostatic, at a drained top"),
-      row<&S::top_pressure_amplitude>("stage.top_pressure_amplitude", "Pa", "0", "", "of a sinusoid added to top_pressure"),
-      row<&S::top_pressure_frequency>("stage.top_pressure_frequency", "Hz", "0", ">= 0", "of that sinusoid"),
-      row<&S::top_pressure_phase>("stage.top_pressure_phase", "rad", "0", "", "of that sinusoid when the stage begins; a stage that asks for the same as the one before goes on with it"),
+      load_row<&S::top_pressure, &S::top_pressure_history>("stage.top_pressure", "Pa", "", "over hydrostatic, at a drained top"),
+      // clang-format on
+  };
+  append(of_stages, of_layers_and_water);
+  append(of_stages,
+         sinusoid_rows<&S::top_pressure_amplitude, &S::top_pressure_frequency, &S::top_pressure_phase>(
+             "top_pressure", "Pa"));
+  const std::vector<Key> of_floor{
+      // clang-format off
       row<&S::fluid_bottom>("stage.fluid_bottom", "", "\"no_flow\"", "no_flow | pressure | flux", "the floor: tight, at bottom_pressure, or with bottom_flux through it"),
-      row<&S::bottom_pressure>("stage.bottom_pressure", "Pa", "0", "", "over hydrostatic, at the floor"),
+      load_row<&S::bottom_pressure, &S::bottom_pressure_history>("stage.bottom_pressure", "Pa", "", "over hydrostatic, at the floor"),
+      // clang-format on
+  };
+  append(of_stages, of_floor);
+  append(
+      of_stages,
+      sinusoid_rows<&S::bottom_pressure_amplitude, &S::bottom_pressure_frequency, &S::bottom_pressure_phase>(
+          "bottom_pressure", "Pa"));
+  append(table, of_stages);
+  const std::vector<Key> of_flux_and_output{
+      // clang-format off
       row<&S::bottom_flux>("stage.bottom_flux", "m/s", "0", "", "Darcy velocity through the floor, upwards"),
 
       records(row<output, &O::series_interval>("output.series_interval", "s", "0.05", "> 0", "of model time")),
@@ -242,7 +302,7 @@ std::vector<Key> make_keys() {
       no_physics(row<guards, &Guards::max_residue>("guards.max_residue", "1", "0.1", "> 0", "energy created or lost over that stored and put in; beyond it the run stops")),
       // clang-format on
   };
-  append(table, of_stages_and_output);
+  append(table, of_flux_and_output);
   return table;
 }
 
@@ -335,6 +395,8 @@ void check_range(const Key& key, const Value& value) {
   if ((number && !in_range(key.accepts, *number)) || (integer && !in_range(key.accepts, double(*integer))))
     throw error("expected ", split(key.accepts, " | ")[0],
                 key.unit.empty() || key.unit == "1" ? "" : " " + key.unit, or_word(key));
+  if (const Load* load = std::get_if<Load>(&value))
+    for (const double one : load->history.value) check_range(key, one);
 }
 
 string suggestion(const string& unknown_key, const string& shown) {
@@ -380,6 +442,7 @@ string join(const std::vector<string>& parts, const string& separator) {
 
 string to_toml(const Value& value) {
   if (const auto* text = std::get_if<string>(&value)) return quoted(*text);
+  if (const auto* load = std::get_if<Load>(&value)) return to_toml(*load);
   if (const auto* flag = std::get_if<bool>(&value)) return *flag ? "true" : "false";
   if (const auto* integer = std::get_if<std::int64_t>(&value)) return std::to_string(*integer);
   if (const auto* list = std::get_if<std::vector<string>>(&value)) {
@@ -401,10 +464,11 @@ string reference(const std::vector<string>& words) {
       "The keys of case.toml: name, default and unit, meaning, (what is accepted), [kinds of stage].\n"
       "A value is a number in SI units or a text with a unit, such as \"80 kPa\".\n";
   string table = "none yet";
-  bool found = false, with_presets = words.empty();
+  bool found = false, with_presets = words.empty(), with_loads = words.empty();
   for (const Key& key : keys()) {
     if (!is_about(key, words)) continue;
     found = true, with_presets = with_presets || key.name == "model.preset";
+    with_loads = with_loads || key.type == Type::load;
     if (key.table() != table) {
       table = key.table();
       const string name = table.substr(0, table.find('.'));
@@ -414,7 +478,7 @@ string reference(const std::vector<string>& words) {
            key.meaning + (key.accepts.empty() ? "" : " (" + key.accepts + ")") +
            (key.kinds.empty() ? "" : " [" + key.kinds + "]") + "\n";
   }
-  if (found) return out + (with_presets ? preset_reference() : "");
+  if (found) return out + (with_loads ? load_reference() : "") + (with_presets ? preset_reference() : "");
   std::vector<string> names;
   for (const Key& key : keys()) {
     names.push_back(leaf(key.name));

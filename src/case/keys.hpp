@@ -8,13 +8,14 @@
 #include <vector>
 
 #include "case/case.hpp"
+#include "case/load.hpp"
 
 namespace moraine::cases {
 
-using Value = std::variant<double, std::int64_t, bool, std::string, std::vector<std::string>>;
+using Value = std::variant<double, std::int64_t, bool, std::string, std::vector<std::string>, Load>;
 
 struct Key {
-  enum class Type { number, integer, boolean, text, choice, path, list };
+  enum class Type { number, integer, boolean, text, choice, path, list, load };  // load: see load.hpp
   std::string name;  // "contact.k_n"; keys of a stage are "stage...."
   Type type;
   std::string unit;      // SI

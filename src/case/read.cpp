@@ -57,8 +57,58 @@ double number(const Key& key, const toml::node& node) {
   return value + 0.0;  // no negative zero
 }
 
+// Of a list of quantities, such as ["20 kPa", "80 kPa"].
+std::vector<double> numbers(const Key& key, const toml::table& table, const string& name) {
+  const toml::array* array = table[name].as_array();
+  if (!array) throw error(name, ": expected a list");
+  std::vector<double> list;
+  for (const toml::node& element : *array) list.push_back(about(name, [&] { return number(key, element); }));
+  return list;
+}
+
+Load load(const Key& key, const toml::table& table) {
+  Key seconds = key;
+  seconds.unit = "s";
+  const auto has_only = [&](const std::vector<string>& names) {
+    return std::all_of(table.begin(), table.end(), [&](const auto& entry) {
+      return std::find(names.begin(), names.end(), entry.first.str()) != names.end();
+    });
+  };
+  Load out;
+  History& h = out.history;
+  if (const toml::node* between = table.get("interpolation")) {
+    const string word = between->value_or(string());
+    if (word != "linear" && word != "steps") throw error("interpolation: expected linear or steps");
+    if (word == "steps") h.between = History::Between::steps;
+  }
+  if (table.contains("ramp") && table.contains("over") && has_only({"ramp", "over"})) {
+    out.form = Load::Form::ramp;
+    h.value = numbers(key, table, "ramp");
+    if (h.value.size() != 2) throw error("ramp: expected two values, [from, to]");
+    h.time = {0, about("over", [&] { return number(seconds, *table.get("over")); })}, h.stays = true;
+    if (!(h.time[1] > 0)) throw error("over: expected > 0 s");
+  } else if (table.contains("times") && table.contains("values") &&
+             has_only({"times", "values", "interpolation"})) {
+    out.form = Load::Form::list;
+    h.time = numbers(seconds, table, "times"), h.value = numbers(key, table, "values");
+    if (h.time.size() != h.value.size() || h.time.size() < 2)
+      throw error(h.time.size(), " times and ", h.value.size(), " values; expected as many, two at least");
+    check_times(h, [](std::size_t k) { return "times[" + std::to_string(k) + "]"; });
+  } else if (table.contains("table") && has_only({"table", "interpolation"})) {
+    out.form = Load::Form::table;
+    out.table = table["table"].value_or(string());
+    if (out.table.empty()) throw error("table: expected the name of a CSV file");
+  } else {
+    throw error("expected a number, ", load_forms);
+  }
+  return out;
+}
+
 Value convert(const Key& key, const toml::node& node) {
   switch (key.type) {
+    case Type::load:
+      if (const toml::table* table = node.as_table()) return load(key, *table);
+      return number(key, node);
     case Type::number:
       if (const string word = word_of(key); !word.empty() && node.is_string()) {
         if (*node.value<string>() == word) return word;
@@ -177,8 +227,11 @@ class File {
     Entry entry{{}, at(node) + name + " = " + text_of(node)};
     entry.value = about(entry.stated, [&] { return checked(key, node); });
     // A path means the same file to the case that inherits it.
-    if (key.type == Type::path && !text_in(entry).empty() && directory_ != root_)
-      text_in(entry) = fs::proximate(directory_ / text_in(entry), root_).string();
+    const auto for_root = [&](string& path) {
+      if (!path.empty() && directory_ != root_) path = fs::proximate(directory_ / path, root_).string();
+    };
+    if (key.type == Type::path) for_root(text_in(entry));
+    if (Load* load = std::get_if<Load>(&entry.value)) for_root(load->table);
     return entry;
   }
 
@@ -343,7 +396,7 @@ std::map<string, string> read_resolved(const string& text) {
   std::vector<string> stages;
   const auto take = [&](const string& table, const toml::table& keys) {
     for (const auto& [leaf, value] : keys)
-      if (!value.is_table() && !value.is_array_of_tables())
+      if (!(value.is_table() && !value.as_table()->is_inline()) && !value.is_array_of_tables())
         values[table + string(leaf.str())] = text_of(value);
   };
   const toml::table all = toml::parse(text);

@@ -36,7 +36,11 @@ ut_system* unit_system() {
   static const Owned<ut_system> system = [] {
     ut_set_error_message_handler(ut_ignore);
     const std::string table = table_beside_program();
-    return Owned<ut_system>(ut_read_xml(table.empty() ? nullptr : table.c_str()));
+    Owned<ut_system> read(ut_read_xml(table.empty() ? nullptr : table.c_str()));
+    if (!read) return read;
+    const Owned<ut_unit> degree(ut_get_unit_by_name(read.get(), "degree"));
+    if (degree) ut_map_name_to_unit("deg", UT_UTF8, degree.get());  // which it does not know
+    return read;
   }();
   if (!system)
     throw error(

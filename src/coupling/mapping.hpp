@@ -60,7 +60,7 @@ class Mapping {
   // squeeze: m, sum of the overlaps of each grain, by which loose ones are told.
   void build(const fluid::Grid& grid, const SidesOf& sides, const dem::GrainRow* grains,
              const std::vector<dem::Vec3d>& x, const std::vector<double>& squeeze,
-             const std::vector<bool>& top_layer);
+             const std::vector<double>& top_layer);
   // Displacements are counted from here, memory order.
   void start_from(const std::vector<dem::Vec3d>& x);
   void start_from(Index chunk, const dem::GrainRow* grains);
@@ -81,7 +81,7 @@ class Mapping {
 
   // What U and g of each face are multiplied with, outside of these sums.
   const Faces& scale() const { return scale_; }
-  const Faces& layer() const { return layer_; }  // m2, sum of b over the grains of the top layer
+  const Faces& layer() const { return layer_; }  // m2, sum of b over the top layer, by grains' shares
   const Faces& solid_fraction() const {
     return psi_;
   }  // 1, about each face; psi_min at least where grains are
@@ -151,7 +151,7 @@ class Mapping {
   void put_hats(const fluid::Grid& grid, int axis, const std::vector<dem::Vec3d>& x);
   void find_bearing(const fluid::Grid& grid, const dem::GrainRow* grains, const std::vector<double>& squeeze);
   void weigh(const fluid::Grid& grid, int axis, bool open_low, bool open_high);
-  void round(int axis, const std::vector<bool>& top_layer);
+  void round(int axis, const std::vector<double>& top_layer);
   void lay_out(int axis);
   void lay_out_wide(int axis);
   template <class Displacement>

@@ -12,7 +12,7 @@ using dem::Vec3d;
 
 void Mapping::build(const fluid::Grid& grid, const SidesOf& sides, const dem::GrainRow* grains,
                     const std::vector<Vec3d>& x, const std::vector<double>& squeeze,
-                    const std::vector<bool>& top_layer) {
+                    const std::vector<double>& top_layer) {
   const auto n = static_cast<Index>(x.size());
   const Index size = dem::chunk_size(n);
   chunks_.assign(static_cast<std::size_t>(dem::chunk_count(n)), {});
@@ -215,7 +215,7 @@ void Mapping::weigh(const fluid::Grid& grid, int axis, bool open_low, bool open_
 
 // Weights of other grains to 16 bits, in units of scale_; those of wide grains make up for what that leaves
 // of a face's sum, or else scale_ does.
-void Mapping::round(int axis, const std::vector<bool>& top_layer) {
+void Mapping::round(int axis, const std::vector<double>& top_layer) {
   const std::vector<Stencil>& faces = stencils_;
   constexpr double most = 32767;
   const std::size_t count = psi_[axis].size();
@@ -232,7 +232,7 @@ void Mapping::round(int axis, const std::vector<bool>& top_layer) {
       std::int16_t& b = weights_[i].b[axis][e];
       b = largest[f] > 0 ? static_cast<std::int16_t>(std::lrint(most * faces[i].w[e] / largest[f])) : 0;
       rounded[f] += b;
-      if (top_layer[i]) layer_[axis][f] += b;
+      if (top_layer[i] != 0) layer_[axis][f] += top_layer[i] * b;
     }
   scale_[axis].assign(count, 0);
   for (std::size_t f = 0; f < count; ++f)
@@ -251,7 +251,7 @@ void Mapping::round(int axis, const std::vector<bool>& top_layer) {
       Spread& s = spread_[k];
       if (s.b == 0) continue;
       s.b /= scale_[axis][s.face];
-      if (top_layer[w.grain]) layer_[axis][s.face] += s.b;
+      if (top_layer[w.grain] != 0) layer_[axis][s.face] += top_layer[w.grain] * s.b;
     }
 }
 

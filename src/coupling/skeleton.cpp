@@ -44,7 +44,7 @@ Skeleton::Skeleton(const Water& water, const dem::Scene& scene, const dem::State
   for (dem::Index i = 0; i < grains.size(); ++i) {
     volume_.push_back(dem::sphere_volume(grains.r[i])), solids_ += volume_.back();
     over_r += volume_.back() / grains.r[i];
-    top_layer_.push_back(in_top_layer(grains, i));
+    top_layer_.push_back(share_of_top_layer(scene, grains, i));
   }
   sauter_ = 2 * solids_ / over_r;
   const fluid::Sides sides = sides_of(water);

@@ -55,7 +55,7 @@ class Skeleton {
   std::vector<dem::GrainRow> grains_;  // where they were at make()
   std::vector<double> volume_;
   double solids_ = 0, sauter_ = 0;  // sauter: m, mean diameter
-  std::vector<bool> top_layer_;
+  std::vector<double> top_layer_;   // shares of its velocity, 0: of no grain of it
   dem::TouchingPairs touching_;
   Mapping mapping_;
   fluid::Medium medium_;

@@ -36,7 +36,7 @@ double water_frequency(const Skeleton& skeleton, const Water& water, const std::
   const std::vector<double>& volume = skeleton.volume();
   fluid::Sides sides = sides_of(water);  // how they differ from rest
   for (auto* list : {&sides.low, &sides.high})
-    for (fluid::Side& s : *list) s.value = s.amplitude = 0;
+    for (fluid::Side& s : *list) s.value = s.amplitude = 0, s.history = {};
   const double wall_mass = mass_of_free_wall(scene);
 
   Thrust thrust{zeros_on_faces(grid), zeros_on_faces(grid)};

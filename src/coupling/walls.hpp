@@ -28,8 +28,10 @@ inline double mass_of_free_wall(const dem::Scene& scene) {
 // m, where a top wall stands.
 inline double wall_z(const dem::BodyMotion& bodies) { return bodies.find(dem::BodyId::top_wall)->place; }
 
-inline bool in_top_layer(const dem::State& grains, dem::Index i) {
-  return grains.part_of[i] == dem::BodyId::top_layer;
+// Of the top layer's velocity that the grain has; 0 where it is no part of it.
+inline double share_of_top_layer(const dem::Scene& scene, const dem::State& grains, dem::Index i) {
+  if (grains.part_of[i] != dem::BodyId::top_layer) return 0;
+  return dem::share_at(scene.body(dem::BodyId::top_layer).x.profile, grains.x[i].y, scene.box.y);
 }
 
 }  // namespace moraine::coupling

@@ -22,6 +22,10 @@ class Engine {
   // fluid: where scene.exchange_interval > 0, and then for as long as the engine runs.
   virtual void load(const Scene& scene, const State& state, FluidCoupling* fluid = nullptr) = 0;
 
+  // Takes from the scene what drives the bodies from the present step on, of the same kinds as before; all
+  // else goes on. No search, no load: made for histories of many pieces.
+  virtual void redrive(const Scene& scene) = 0;
+
   // Advances so many steps. Throws Error naming grain, step and place when a number stops being finite or a
   // grain leaves.
   virtual void advance(std::int64_t steps) = 0;

@@ -17,12 +17,12 @@ struct Triple : Vec3d {
 // no gravity.
 struct Mobility {
   double inverse_mass_xy, inverse_mass_z;  // 1/kg
-  double gravity;                          // m/s2, along z
+  Vec3d gravity;                           // m/s2
   double inverse_inertia;                  // 1/(kg m2)
 
   MORAINE_HD Vec3d acceleration(const Vec3d& f) const {
-    return {fma(f.x, inverse_mass_xy, 0.0), fma(f.y, inverse_mass_xy, 0.0),
-            fma(f.z, inverse_mass_z, gravity)};
+    return {fma(f.x, inverse_mass_xy, gravity.x), fma(f.y, inverse_mass_xy, gravity.y),
+            fma(f.z, inverse_mass_z, gravity.z)};
   }
   MORAINE_HD Vec3d spin_acceleration(const Vec3d& torque) const { return inverse_inertia * torque; }
 };
@@ -30,13 +30,14 @@ struct Mobility {
 // A grain of a layer answers along z at most.
 MORAINE_HD Mobility mobility(const Scene& scene, double r, BodyId part_of) {
   const double m = scene.inertial_mass(r);
-  if (part_of == BodyId::none) return {1 / m, 1 / m, -scene.fall(r), 1 / (0.4 * m * r * r)};
-  return {0, scene.is_rigid(part_of) ? 0 : 1 / m, 0, 0};
+  if (part_of == BodyId::none) return {1 / m, 1 / m, scene.fall(r) * scene.down, 1 / (0.4 * m * r * r)};
+  return {0, scene.is_rigid(part_of) ? 0 : 1 / m, {0, 0, 0}, 0};
 }
 // The same from a grain's row, which says by its inverse_inertia whether the grain is free.
 MORAINE_HD Mobility mobility(const Scene& scene, const GrainRow& g) {
   const bool free = g.inverse_inertia > 0;
-  return {free ? g.inverse_mass : 0, g.inverse_mass, free ? -scene.fall(g.r) : 0, g.inverse_inertia};
+  return {free ? g.inverse_mass : 0, g.inverse_mass, free ? scene.fall(g.r) * scene.down : Vec3d{0, 0, 0},
+          g.inverse_inertia};
 }
 
 template <class Row>

@@ -32,9 +32,9 @@ Velocities at_step(const Scene& scene, const State& s) {
   const BodyMotion bodies = bodies_at_step(scene, s);
   for (int k = 0; k < bodies.servos; ++k) {
     const Servo& layer = bodies.servo[k];
-    if (layer.is_plane() || !layer.by_stress()) continue;
+    if (layer.is_plane() || !layer.tells_grains()) continue;
     for (Index i = 0; i < s.size(); ++i)
-      if (s.part_of[i] == layer.body) w.v[i][layer.axis] = layer.v;
+      if (s.part_of[i] == layer.body) w.v[i][layer.axis] = layer.share(scene, s.x[i]) * layer.v;
   }
   return w;
 }
@@ -127,8 +127,14 @@ void mark_slipping(const Scene& scene, State& s) {
 }
 
 Loads loads_of(const Scene& scene, const State& s) {
+  double shear_force = s.at(BodyId::top_layer).force.x;
+  if (scene.body(BodyId::top_layer).x.profile != Profile::uniform) {  // where that is by shares
+    shear_force = 0;
+    for (Index i = 0; i < s.size(); ++i)
+      if (s.part_of[i] == BodyId::top_layer) shear_force += s.force[i].x;
+  }
   return {contact_forces(scene, s), wall_forces(scene, s, at_step(scene, s)), s.force,
-          s.at(BodyId::top_wall).force.z, s.at(BodyId::top_layer).force.x};
+          s.at(BodyId::top_wall).force.z, shear_force};
 }
 
 void add(Loads& sum, const Loads& next) {
@@ -236,7 +242,8 @@ Observation observe(const Scene& scene, const State& s, const Loads& loads) {
     e.kinetic += 0.5 * m * before_times_after(s.v[i], at.v[i]);
     e.rotational += 0.5 * inertia * before_times_after(s.omega[i], at.omega[i]);
     if (s.part_of[i] != BodyId::none) continue;
-    e.potential += sphere_mass(scene.density, s.r[i]) * scene.submerged_gravity() * s.x[i].z;
+    const double height = -(scene.down.x * s.x[i].x + scene.down.z * s.x[i].z);
+    e.potential += sphere_mass(scene.density, s.r[i]) * scene.submerged_gravity() * height;
     const Vec3d a =
         mob.acceleration(s.water_force.empty() ? loads.force[i] : loads.force[i] + s.water_force[i]);
     net += m * std::sqrt(dot(a, a));

@@ -1,7 +1,8 @@
 // A checked description of one stage: what surrounds the grains and what drives them. Constant while the
 // stage runs, but for the time step where that follows the bed.
 //
-// Signs, for the whole code: x is the shear direction, z points up, gravity acts along -z. Stresses are
+// Signs, for the whole code: x is the shear direction, z points up, gravity acts along -z or, on a slope,
+// downhill towards +x as well. Stresses are
 // positive in compression. An overlap is a negative delta_n. A force "on the wall" by the grains is positive
 // upwards. SI units everywhere; J, N, Pa, m, s, kg.
 #pragma once
@@ -20,6 +21,7 @@ struct Scene {
   Vec3d box{0, 0, 0};  // m; side lengths. z matters only where it is periodic.
   bool periodic_x = true, periodic_y = true, periodic_z = false;
   double gravity = 9.80665;  // m/s2
+  Vec3d down{0, 0, -1};      // its direction, a unit vector; (sin, 0, -cos) of a slope
   double density = 2600;     // kg/m3, of the grains
   double least_inertia = 0;  // m; density scaling: smaller grains have the inertia of this radius; 0: none
   double fluid_density = 0;  // kg/m3, of water that fills the pores; 0: dry
@@ -60,7 +62,7 @@ struct Scene {
     return gravity * (1 - fluid_density / density);
   }  // m/s2, less buoyancy
 
-  // m/s2, of a grain of this radius, whose weight density scaling leaves as it is.
+  // m/s2 along `down`, of a grain of this radius, whose weight density scaling leaves as it is.
   MORAINE_HD double fall(double r) const {
     const double part = r < least_inertia ? r / least_inertia : 1;
     return submerged_gravity() * (part * part * part);

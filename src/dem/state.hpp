@@ -41,7 +41,7 @@ struct WaterReaction {
 struct BodyState {
   Vec3d x;      // m, of a plane along its normal, where it moves
   Vec3d v;      // m/s
-  Vec3d force;  // N, of the grains on it
+  Vec3d force;  // N, of the grains on it; where a layer's velocity has a profile, by their shares of it
 };
 
 struct State {

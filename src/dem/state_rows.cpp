@@ -14,8 +14,10 @@ std::vector<GrainRow> grain_rows(const Scene& scene, const State& s) {
     g = {s.x[i], s.r[i], s.v[i], s.r[i], s.omega[i], m.inverse_mass_z, s.rotation[i], m.inverse_inertia};
     if (layer == BodyId::none) continue;
     const Drive& along_x = scene.body(layer).x;
-    const double u = along_x.kind == Drive::Kind::stress ? s.at(layer).v.x : along_x.velocity;
-    g.v = {u, 0, scene.is_rigid(layer) ? 0 : s.v[i].z};
+    const bool under_way = along_x.kind == Drive::Kind::stress || (s.staggered && along_x.changes());
+    const double u = under_way ? s.at(layer).v.x : along_x.velocity_at(scene.time(s.step));
+    const double share = share_at(along_x.profile, s.x[i].y, scene.box.y);
+    g.v = {share * u, 0, scene.is_rigid(layer) ? 0 : s.v[i].z};
     g.omega = {0, 0, 0};
   }
   return rows;

@@ -26,7 +26,7 @@ void check_side(const Side& s, int axis, bool high) {
   };
   for (const double v : {s.value, s.amplitude, s.frequency, s.phase})
     if (!std::isfinite(v)) refuse("has the value ", v, "; expected a finite number");
-  if (s.kind == Side::Kind::closed && (s.value != 0 || s.amplitude != 0))
+  if (s.kind == Side::Kind::closed && (s.value != 0 || s.changes()))
     refuse("is closed and yet has a value (", s.value, ") or amplitude (", s.amplitude,
            "); expected 0 for both, or a side of given pressure or flux");
   if (s.frequency < 0) refuse("has the frequency ", s.frequency, " Hz; expected 0 or more");

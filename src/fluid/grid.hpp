@@ -11,6 +11,8 @@
 #include <cstddef>
 #include <numbers>
 
+#include "history.hpp"
+
 namespace moraine::fluid {
 
 struct Grid {
@@ -41,9 +43,12 @@ struct Side {
   double amplitude = 0;  // of value + amplitude sin(2 pi frequency t + phase), in the unit of value
   double frequency = 0;  // Hz
   double phase = 0;      // rad
+  History history{};     // of value, in its unit; empty: it does not change
 
+  bool changes() const { return amplitude != 0 || history.is_there(); }
   double at(double t) const {  // t in s since the stage began
-    return value + (amplitude != 0 ? amplitude * std::sin(2 * std::numbers::pi * frequency * t + phase) : 0);
+    return (history.is_there() ? history.at(t) : value) +
+           (amplitude != 0 ? amplitude * std::sin(2 * std::numbers::pi * frequency * t + phase) : 0);
   }
   bool operator==(const Side&) const = default;
 };

@@ -18,7 +18,7 @@ inline constexpr bool hdf5::all_doubles<Row> = true;
 namespace {
 
 constexpr const char* kind = "checkpoint";
-constexpr std::int64_t format = 8;  // raise it with every change to a struct below
+constexpr std::int64_t format = 9;  // raise it with every change to a struct below
 
 // Every member of every stored struct, once, for writing and for reading. A new member is one more line; one
 // that is forgotten does not compile.
@@ -38,6 +38,8 @@ constexpr std::tuple members<dem::Drive>{
     Member{"kind", &dem::Drive::kind},           Member{"velocity", &dem::Drive::velocity},
     Member{"mean", &dem::Drive::mean},           Member{"amplitude", &dem::Drive::amplitude},
     Member{"frequency", &dem::Drive::frequency}, Member{"phase", &dem::Drive::phase},
+    Member{"rate", &dem::Drive::rate},           Member{"since", &dem::Drive::since},
+    Member{"piecewise", &dem::Drive::piecewise}, Member{"profile", &dem::Drive::profile},
 };
 
 template <>
@@ -56,6 +58,7 @@ constexpr std::tuple members<dem::Scene>{
     Member{"periodic_y", &dem::Scene::periodic_y},
     Member{"periodic_z", &dem::Scene::periodic_z},
     Member{"gravity", &dem::Scene::gravity},
+    Member{"down", &dem::Scene::down},
     Member{"density", &dem::Scene::density},
     Member{"least_inertia", &dem::Scene::least_inertia},
     Member{"fluid_density", &dem::Scene::fluid_density},
@@ -136,10 +139,25 @@ constexpr std::tuple members<SnapshotInfo>{
 };
 
 template <>
+constexpr std::tuple members<History>{
+    Member{"between", &History::between},
+    Member{"stays", &History::stays},
+    Member{"time", &History::time},
+    Member{"value", &History::value},
+};
+
+template <>
+constexpr std::tuple members<Histories>{
+    Member{"normal_stress", &Histories::normal_stress},
+    Member{"shear_stress", &Histories::shear_stress},
+    Member{"velocity", &Histories::velocity},
+};
+
+template <>
 constexpr std::tuple members<fluid::Side>{
     Member{"kind", &fluid::Side::kind},           Member{"value", &fluid::Side::value},
     Member{"amplitude", &fluid::Side::amplitude}, Member{"frequency", &fluid::Side::frequency},
-    Member{"phase", &fluid::Side::phase},
+    Member{"phase", &fluid::Side::phase},         Member{"history", &fluid::Side::history},
 };
 
 template <>
@@ -209,6 +227,7 @@ constexpr std::tuple members<Checkpoint>{
     Member{"critical_at", &Checkpoint::critical_at},
     Member{"finished", &Checkpoint::finished},
     Member{"scene", &Checkpoint::scene},
+    Member{"histories", &Checkpoint::histories},
     Member{"water_settings", &Checkpoint::water_settings},
     Member{"state", &Checkpoint::state},
     Member{"water", &Checkpoint::water},
@@ -226,6 +245,10 @@ template <>
 constexpr auto last<dem::Body::Shape> = dem::Body::Shape::layer;
 template <>
 constexpr auto last<dem::Drive::Kind> = dem::Drive::Kind::free;
+template <>
+constexpr auto last<dem::Profile> = dem::Profile::half;
+template <>
+constexpr auto last<History::Between> = History::Between::steps;
 template <>
 constexpr auto last<dem::Material> = dem::Material::wall;
 static_assert(static_cast<int>(last<dem::Material>) + 1 == dem::materials);
@@ -301,6 +324,17 @@ void put_list(const hdf5::Group& group, const char* name, const std::vector<T>& 
       for (const T& entry : list) column.push_back(entry.*pointer);
       put_list(inner, member, column);
     });
+  } else if constexpr (is_list<T>) {  // one after the other, and how long each is
+    const hdf5::Group inner = group.create_group(name);
+    std::vector<std::int64_t> lengths;
+    T all;
+    for (const T& one : list) {
+      lengths.push_back(static_cast<std::int64_t>(one.size()));
+      all.insert(all.end(), one.begin(), one.end());
+    }
+    inner.write("lengths", lengths), put_list(inner, "all", all);
+  } else if constexpr (std::same_as<T, bool>) {
+    group.write(name, std::vector<std::uint8_t>(list.begin(), list.end()));
   } else {
     group.write(name, list);
   }
@@ -347,6 +381,24 @@ void get_list(const hdf5::Group& group, const char* name, std::vector<T>& list) 
       }
       for (std::size_t k = 0; k < list.size(); ++k) list[k].*pointer = column[k];
     });
+  } else if constexpr (is_list<T>) {
+    const hdf5::Group inner = group.open_group(name);
+    std::vector<std::int64_t> lengths;
+    T all;
+    inner.read("lengths", lengths), get_list(inner, "all", all);
+    std::size_t from = 0;
+    for (const std::int64_t length : lengths) {
+      if (length < 0 || static_cast<std::size_t>(length) > all.size() - from)
+        throw error(inner.where("lengths"), ": ", length, " of ", all.size() - from,
+                    " numbers that are left");
+      const auto begin = all.begin() + static_cast<std::ptrdiff_t>(from);
+      list.emplace_back(begin, begin + static_cast<std::ptrdiff_t>(length));
+      from += static_cast<std::size_t>(length);
+    }
+  } else if constexpr (std::same_as<T, bool>) {
+    std::vector<std::uint8_t> numbers;
+    group.read(name, numbers);
+    list.assign(numbers.begin(), numbers.end());
   } else {
     group.read(name, list);
     for (const T& value : list) check_enumeration(group, name, value);
@@ -434,8 +486,21 @@ void validate(const std::string& file, const dem::State& state) {
     fail("wall_contacts are not sorted by (wall, i)");
 }
 
+// Of what a stage follows.
+void validate(const std::string& file, const Checkpoint& c, const char* what, const History& h) {
+  const bool rises = std::ranges::is_sorted(h.time, std::less_equal<>());
+  if (h.time.size() == h.value.size() && rises) return;
+  throw error(file, ": stage ", c.stage, ": the history of the ", what, " has ", h.value.size(),
+              " values at ", h.time.size(), " times", rises ? "" : ", which do not rise");
+}
+
 void validate(const std::string& file, const Checkpoint& c) {
   validate(file, c.scene);
+  validate(file, c, "normal stress", c.histories.normal_stress);
+  validate(file, c, "shear stress", c.histories.shear_stress);
+  validate(file, c, "velocity", c.histories.velocity);
+  for (const auto* sides : {&c.water_settings.sides.low, &c.water_settings.sides.high})
+    for (const fluid::Side& side : *sides) validate(file, c, "water", side.history);
   validate(file, c.state);
   const coupling::WaterState& w = c.water;
   const std::size_t n = c.state.r.size();

@@ -54,10 +54,15 @@ struct Row {
   // Of a box that is pressed; columns only where a stage of the case presses.
   double side_x, side_y, side_z;        // m
   double stress_x, stress_y, stress_z;  // Pa, of the grains on its sides
+  // What is asked for; columns only where a stage of the case follows a history. 0 where nothing is.
+  double asked_normal_stress, asked_shear_stress;    // Pa
+  double asked_velocity;                             // m/s, of the top layer
+  double asked_top_pressure, asked_bottom_pressure;  // Pa
 };
-const std::vector<Column>& columns();     // as many as Row has doubles, in its order
-constexpr std::size_t dry_columns = 27;   // of these, the first
-constexpr std::size_t side_columns = 39;  // from here those of a pressed box; in between those of water
+const std::vector<Column>& columns();      // as many as Row has doubles, in its order
+constexpr std::size_t dry_columns = 27;    // of these, the first
+constexpr std::size_t side_columns = 39;   // from here those of a pressed box; in between those of water
+constexpr std::size_t asked_columns = 45;  // from here what histories ask for
 
 // series.h5: one extendible chunked dataset of doubles for each column, each with attributes `units` and
 // `meaning`.
@@ -65,7 +70,7 @@ class Series {
  public:
   // Creates PATH anew holding `rows` (written aside and renamed), then opens it for appending in SWMR mode.
   Series(const std::filesystem::path& path, const std::vector<Row>& rows, bool with_water = false,
-         bool with_sides = false);
+         bool with_sides = false, bool with_asked = false);
   ~Series();
   void append(const Row& row);  // flushed: a reader sees it at once
   const std::vector<Row>& rows() const;
@@ -137,6 +142,7 @@ struct Checkpoint {
   std::int64_t critical_at = 0;
   bool finished = false;
   dem::Scene scene;                // of the stage; dt = 0: none yet
+  Histories histories;             // that its bodies follow; the scene has the present pieces
   coupling::Water water_settings;  // of the stage, as its case asks for
   dem::State state;
   coupling::WaterState water;

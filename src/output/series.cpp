@@ -86,6 +86,11 @@ const std::vector<Column>& columns() {
       {"stress_x", "Pa", "stress of the contacts along x, positive in compression"},
       {"stress_y", "Pa", "stress of the contacts along y"},
       {"stress_z", "Pa", "stress of the contacts along z"},
+      {"asked_normal_stress", "Pa", "normal stress asked for"},
+      {"asked_shear_stress", "Pa", "shear stress asked for"},
+      {"asked_velocity", "m/s", "velocity of the top layer asked for"},
+      {"asked_top_pressure", "Pa", "pressure of the water asked for at the top"},
+      {"asked_bottom_pressure", "Pa", "pressure of the water asked for at the floor"},
   };
   return list;
 }
@@ -99,10 +104,11 @@ struct Series::Impl {
 };
 
 Series::Series(const std::filesystem::path& path, const std::vector<Row>& rows, bool with_water,
-               bool with_sides) {
+               bool with_sides, bool with_asked) {
   std::vector<std::size_t> wanted;
   for (std::size_t c = 0; c < columns().size(); ++c)
-    if (c < dry_columns || (c < side_columns ? with_water : with_sides)) wanted.push_back(c);
+    if (c < dry_columns || (c < side_columns ? with_water : c < asked_columns ? with_sides : with_asked))
+      wanted.push_back(c);
   const hdf5::Lock lock;
   const std::filesystem::path aside = path.string() + ".tmp";
   std::error_code cause;

@@ -186,7 +186,8 @@ void check_case(const Options& options) {
     const dem::Scene& scene = stage.scene;
     // Before the bed has settled its height is not known: from the volume of the grains.
     const double height = c.start.empty() ? settled : stage.height_0;
-    double strain_rate = wanted.strain_rate != 0 ? wanted.strain_rate : layer_velocity(scene) / height;
+    double strain_rate =
+        wanted.strain_rate != 0 ? wanted.strain_rate : layer_velocity(wanted, scene) / height;
     const double duration = wanted.duration > 0   ? wanted.duration
                             : wanted.porosity > 0 ? stage.duration
                                                   : wanted.strain / std::abs(strain_rate);

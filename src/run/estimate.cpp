@@ -168,7 +168,7 @@ double Estimate::per_step(const Stage& stage, dem::State bed, double speed) {
   scene.dt *= slower;
   for (dem::Body& body : scene.bodies)
     for (int a = 0; a < 3; ++a) body.along(a).velocity /= slower;
-  double fastest = std::max({speed, std::abs(layer_velocity(stage.scene)), 1e-9});
+  double fastest = std::max({speed, std::abs(stage.scene.body(dem::BodyId::top_layer).x.velocity), 1e-9});
   for (dem::Vec3d& v : bed.v) fastest = std::max(fastest, std::sqrt(dot(v, v))), v = (1 / slower) * v;
   bed.v[bed.size() / 2] = {speed / slower, 0, 0};
   // As long as the bed is still what it was: none has moved by more than half a diameter (and none falls
@@ -202,6 +202,16 @@ double Estimate::processor_time() const {
          (here ? engine_.threads() : 1);
 }
 
+// Of loads that change the largest, for good: what is timed is as fast as the stage at its fastest.
+static void hold_largest(const cases::Stage& wanted, dem::Scene& scene) {
+  dem::Drive &wall = scene.body(dem::BodyId::top_wall).z, &layer = scene.body(dem::BodyId::top_layer).x;
+  if (wanted.normal_stress_history.is_there()) wall.mean = wanted.normal_stress;
+  if (wanted.shear_stress_history.is_there()) layer.mean = wanted.shear_stress;
+  layer.velocity = layer_velocity(wanted, scene);
+  if (layer.kind == dem::Drive::Kind::velocity) layer.amplitude = 0;
+  for (dem::Drive* drive : {&wall, &layer}) drive->rate = 0, drive->piecewise = false;
+}
+
 Estimate::Time Estimate::stage(std::size_t index, double duration, double dt) {
   const cases::Stage& wanted = case_.stages[index];
   if (loose_ && packed_.contacts.empty()) pack();
@@ -218,9 +228,10 @@ Estimate::Time Estimate::stage(std::size_t index, double duration, double dt) {
     stage.scene.exchange_interval = 0;
   }
   if (one_size_) stage.scene.dt = dt;
+  hold_largest(wanted, stage.scene);
   const double steps = std::max(1.0, std::round(duration / stage.scene.dt));
   double speed = 0;  // m/s, of the fastest grain
-  if (wanted.kind == Kind::shear) speed = 3 * std::abs(layer_velocity(stage.scene));
+  if (wanted.kind == Kind::shear) speed = 3 * std::abs(layer_velocity(wanted, stage.scene));
   if (wanted.normal_stress > 0)  // what the wall has pushed comes to rest in a small part of the stage
     speed = std::max(speed, 0.02 * std::sqrt(wanted.normal_stress / case_.grains.density));
   const double way = bed_top(start_.before.state) - bed_top(bed);

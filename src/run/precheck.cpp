@@ -89,6 +89,8 @@ void check_margin(const Stage& stage, const dem::State& s, std::vector<std::stri
   double speed = 0;
   for (const dem::Body& body : scene.bodies)
     for (int a = 0; a < 3; ++a) speed = std::max(speed, std::abs(body.along(a).velocity));
+  if (shears(stage.kind))  // at its fastest
+    speed = std::max(speed, std::abs(stage.strain_rate) * stage.height_0);
   for (const dem::Vec3d& v : s.v) speed = std::max(speed, std::sqrt(dot(v, v)));
   const double least = 4 * speed * scene.dt;
   if (scene.neighbour_margin <= least)

@@ -12,10 +12,17 @@ namespace moraine::run {
 
 namespace {
 
-double layer_displacement(const dem::State& s) {
-  for (dem::Index i = 0; i < s.size(); ++i)
-    if (s.part_of[i] == dem::BodyId::top_layer) return s.x[i].x - s.x_start[i].x;
-  return 0;
+// m; where the velocity has a profile across y, as far as a grain with the whole velocity would be.
+double layer_displacement(const dem::Scene& scene, const dem::State& s) {
+  const dem::Profile profile = scene.body(dem::BodyId::top_layer).x.profile;
+  double largest = 0, displacement = 0;
+  for (dem::Index i = 0; i < s.size(); ++i) {
+    if (s.part_of[i] != dem::BodyId::top_layer) continue;
+    const double share = dem::share_at(profile, s.x[i].y, scene.box.y);
+    if (share <= largest) continue;
+    largest = share, displacement = (s.x[i].x - s.x_start[i].x) / share;
+  }
+  return displacement;
 }
 
 std::vector<output::Row> rows_of_stage(std::size_t stage, const std::vector<output::Row>& rows) {
@@ -37,7 +44,7 @@ output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, c
   row.step = static_cast<double>(s.step - start.step);
   row.stage_time = stage.scene.time(s.step) - start.clock;
   row.time = start.time + row.stage_time;
-  row.shear_strain = shears(stage.kind) ? layer_displacement(s) / stage.height_0 : 0;
+  row.shear_strain = shears(stage.kind) ? layer_displacement(stage.scene, s) / stage.height_0 : 0;
   row.shear_stress = o.shear_stress;
   row.normal_stress = o.normal_stress;
   row.shear_friction = o.normal_stress > 0 ? o.shear_stress / o.normal_stress : 0;
@@ -58,6 +65,18 @@ output::Row row_of(std::size_t index, const Stage& stage, const dem::State& s, c
     const dem::BoxStress box = dem::box_stress(stage.scene, s);
     row.side_x = stage.scene.box.x, row.side_y = stage.scene.box.y, row.side_z = stage.scene.box.z;
     row.stress_x = box.normal.x, row.stress_y = box.normal.y, row.stress_z = box.normal.z;
+  }
+  const double now = stage.scene.time(s.step);
+  const dem::Drive &wall = stage.scene.body(dem::BodyId::top_wall).z,
+                   &layer = stage.scene.body(dem::BodyId::top_layer).x;
+  using Kind = dem::Drive::Kind;
+  if (wall.kind == Kind::stress) row.asked_normal_stress = wall.stress(now);
+  if (layer.kind == Kind::stress) row.asked_shear_stress = layer.stress(now);
+  if (layer.kind == Kind::velocity) row.asked_velocity = layer.velocity_at(now);
+  if (stage.water.present) {
+    row.asked_top_pressure = stage.water.sides.high[2].at(now);
+    if (stage.water.sides.low[2].kind == fluid::Side::Kind::pressure)
+      row.asked_bottom_pressure = stage.water.sides.low[2].at(now);
   }
   row.residue = stage.scene.ledger ? (e.total() - start.energy) + row.slip + row.viscous - row.top_wall_work -
                                          row.layers_work - row.water_work

@@ -140,10 +140,10 @@ class Runner {
     if (!refused.empty())
       throw error(checkpoint.string(), ": belongs to another version of this case: ", refused,
                   "; undo the change, or use --force to run anew");
-    if (now_.inputs != start_.inputs)
-      throw error(checkpoint.string(), ": the run began with another ",
-                  (case_.start.empty() ? case_.grains.sieves : case_.start).string(),
-                  ", which has changed since; undo the change, or use --force to run anew");
+    for (const fs::path& file : input_files(case_))
+      if (now_.inputs.find(input(file)) == now_.inputs.npos)
+        throw error(checkpoint.string(), ": the run began with another ", file.string(),
+                    ", which has changed since; undo the change, or use --force to run anew");
     const auto stages = static_cast<std::int64_t>(case_.stages.size());
     if (now_.stage < 0 || now_.stage >= stages || now_.rows.empty())
       throw error(checkpoint.string(), ": stands in stage ", now_.stage, " of ", stages,
@@ -179,8 +179,8 @@ class Runner {
     if (!resuming && !start_.note.empty()) progress_->say(start_.note);
     for (const std::string& c : changes_) progress_->say("changed: " + c);
     for (const std::string& w : warnings_) progress_->say("warning: " + w);
-    series_ =
-        std::make_unique<output::Series>(files_.series(), now_.rows, case_.has_water(), case_.presses());
+    series_ = std::make_unique<output::Series>(files_.series(), now_.rows, case_.has_water(), case_.presses(),
+                                               case_.has_histories());
 
     for (auto k = static_cast<std::size_t>(now_.stage); k < case_.stages.size(); ++k)
       run_stage(k, resuming), resuming = false;
@@ -238,7 +238,7 @@ class Runner {
       until = at_exchange(stage, until);
       const auto began = Clock::now();
       const bool due = until == event.step;
-      due ? advance_to_record(stage, until - step) : engine_->advance(until - step);
+      due ? advance_to_record(stage, step, until) : advance(stage, step, until);
       if (seconds_since(began) < 0.1 && until == step + slice) slice *= 2;
       step = until;
       ended = due && event.end;
@@ -331,15 +331,21 @@ class Runner {
     from.planes += s.ledger.planes - before.planes - work;
   }
 
+  // From one step to another.
+  void advance(Stage& stage, std::int64_t step, std::int64_t until) {
+    run::advance(*engine_, stage.scene, stage.histories, step, until);
+    now_.scene.bodies = stage.scene.bodies;
+  }
+
   // With pore water the last interval between exchanges step by step, for the mean loads over it. Same bits
   // as in one go.
-  void advance_to_record(const Stage& stage, std::int64_t steps) {
+  void advance_to_record(Stage& stage, std::int64_t step, std::int64_t until) {
     const std::int64_t m = std::max<std::int64_t>(1, stage.scene.exchange_interval);
-    engine_->advance(steps - (m - 1));
+    advance(stage, step, until - (m - 1));
     take_state();
     loads_ = dem::loads_of(stage.scene, now_.state);
     for (std::int64_t k = 1; k < m; ++k) {
-      engine_->advance(1);
+      advance(stage, until - m + k, until - m + k + 1);
       take_state();
       dem::add(loads_, dem::loads_of(stage.scene, now_.state));
     }

@@ -27,6 +27,10 @@ double default_wall_mass(const cases::Case& c, double grains, double cell) {
   return 0.001 * c.grains.density * grains * std::numbers::pi * std::pow(cell / 2, 3);
 }
 
+bool pressures_cover(const coupling::Water& w, double end) {
+  return w.sides.high[2].history.covers(end) && w.sides.low[2].history.covers(end);
+}
+
 dem::Body top_wall_of(const cases::Case& c, const cases::Stage& stage, const Start& start, double height) {
   using Wanted = cases::Stage::TopWall;
   const bool automatic = stage.top_wall == Wanted::automatic;
@@ -54,6 +58,7 @@ dem::Scene scene_of(const cases::Case& c, const cases::Stage& stage, const Start
   scene.box = box;
   scene.periodic_x = c.periodic_x, scene.periodic_y = c.periodic_y, scene.periodic_z = c.periodic_z;
   scene.gravity = c.gravity, scene.density = c.grains.density;
+  if (c.slope != 0) scene.down = {std::sin(c.slope), 0, -std::cos(c.slope)};
   scene.least_inertia = c.density_scaling;
   dem::ContactParameters &grain = scene.with(dem::Material::grain), &wall = scene.with(dem::Material::wall);
   grain = c.contact, wall = c.wall;
@@ -72,10 +77,19 @@ dem::Scene scene_of(const cases::Case& c, const cases::Stage& stage, const Start
     scene.body(BodyId::y_high) = dem::plane(1, -1, scene.box.y);
   scene.body(BodyId::top_wall) = top_wall_of(c, stage, start, height);
   if (!shears(stage.kind)) return scene;
-  const dem::Drive along_x =
-      stage.kind == Kind::shear
-          ? dem::Drive::at(stage.velocity != 0 ? stage.velocity : stage.strain_rate * height)
-          : dem::Drive::by(stage.shear_stress);
+  using Drive = dem::Drive;
+  const double velocity = stage.velocity != 0 ? stage.velocity : stage.strain_rate * height;
+  const Drive along_x = stage.kind == Kind::shear ? Drive{.kind = Drive::Kind::velocity,
+                                                          .velocity = velocity,
+                                                          .amplitude = stage.velocity_amplitude,
+                                                          .frequency = stage.velocity_frequency,
+                                                          .phase = stage.velocity_phase,
+                                                          .profile = stage.profile}
+                                                  : Drive{.kind = Drive::Kind::stress,
+                                                          .mean = stage.shear_stress,
+                                                          .amplitude = stage.shear_stress_amplitude,
+                                                          .frequency = stage.shear_stress_frequency,
+                                                          .phase = stage.shear_stress_phase};
   scene.body(BodyId::bottom_layer) = dem::layer({}, stage.hold_layer_height);
   scene.body(BodyId::top_layer) = dem::layer(along_x, stage.hold_layer_height);
   scene.body(BodyId::top_layer).mass = stage.layer_mass;
@@ -94,16 +108,28 @@ output::Checkpoint read_start(const std::filesystem::path& path) {
   }
 }
 
-// A file that the grains come from, as it is now.
+}  // namespace
+
+std::vector<std::filesystem::path> input_files(const cases::Case& c) {
+  std::vector<std::filesystem::path> files;
+  if (has_own_grains(c.start)) files.push_back(c.start);
+  if (c.start.empty() && c.grains.distribution == "sieves") files.push_back(c.grains.sieves);
+  files.insert(files.end(), c.tables.begin(), c.tables.end());
+  return files;
+}
+
 std::string input(const std::filesystem::path& file) {
   return file.filename().string() + " " + output::digest_of_file(file);
 }
 
-}  // namespace
-
 bool shears(Kind k) { return k == Kind::shear || k == Kind::shear_stress; }
 
-double layer_velocity(const dem::Scene& scene) { return scene.body(BodyId::top_layer).x.velocity; }
+double layer_velocity(const cases::Stage& stage, const dem::Scene& scene) {
+  const dem::Drive& drive = scene.body(BodyId::top_layer).x;
+  if (drive.kind != dem::Drive::Kind::velocity) return 0;
+  if (!drive.changes()) return drive.velocity;
+  return std::copysign(std::abs(stage.velocity) + std::abs(drive.amplitude), stage.velocity);
+}
 
 void take_layers_away(dem::Scene& scene) {
   scene.body(BodyId::bottom_layer) = scene.body(BodyId::top_layer) = {};
@@ -142,12 +168,11 @@ static std::vector<dem::Sieve> sieves_in(const std::filesystem::path& file) {
   return sieves;
 }
 
-Start start_of(const cases::Case& c) {
+static Start grains_of(const cases::Case& c) {
   if (has_own_grains(c.start)) {
     OwnGrains own = read_own_grains(c);
     Start s{{}, own.box_x, own.box_y, own.box_z, 0};
     s.before.state = std::move(own.state), s.roles = std::move(own.roles), s.note = std::move(own.note);
-    s.inputs = input(c.start);
     double volume = 0;
     for (const double r : s.before.state.r) volume += r * r * r;
     const double n = s.before.state.size();
@@ -199,8 +224,14 @@ Start start_of(const cases::Case& c) {
           loose.box_z > 0 ? loose.box_z : c.box_z,
           default_wall_mass(c, loose.state.size(), loose.cell)};
   s.before.state = std::move(loose.state);
-  if (g.distribution == "sieves") s.inputs = input(g.sieves);
   return s;
+}
+
+Start start_of(const cases::Case& c) {
+  Start start = grains_of(c);
+  for (const std::filesystem::path& file : input_files(c))
+    start.inputs += (start.inputs.empty() ? "" : ", ") + input(file);
+  return start;
 }
 
 namespace {
@@ -237,10 +268,19 @@ coupling::Water water_of(const cases::Case& c, const cases::Stage& stage, const 
   using Kind = fluid::Side::Kind;
   w.top = coupling::TopSide(int(stage.fluid_top));
   if (w.top == coupling::TopSide::drained)
-    w.sides.high[2] = {Kind::pressure, stage.top_pressure, stage.top_pressure_amplitude,
-                       stage.top_pressure_frequency, stage.top_pressure_phase};
+    w.sides.high[2] = {Kind::pressure,
+                       stage.top_pressure,
+                       stage.top_pressure_amplitude,
+                       stage.top_pressure_frequency,
+                       stage.top_pressure_phase,
+                       stage.top_pressure_history};
   if (stage.fluid_bottom == cases::Stage::FluidBottom::pressure)
-    w.sides.low[2] = {Kind::pressure, stage.bottom_pressure};
+    w.sides.low[2] = {Kind::pressure,
+                      stage.bottom_pressure,
+                      stage.bottom_pressure_amplitude,
+                      stage.bottom_pressure_frequency,
+                      stage.bottom_pressure_phase,
+                      stage.bottom_pressure_history};
   if (stage.fluid_bottom == cases::Stage::FluidBottom::flux) w.sides.low[2] = {Kind::flux, stage.bottom_flux};
   w.sides.low[0] = side_of(f.x_low), w.sides.high[0] = side_of(f.x_high);
   w.sides.low[1] = side_of(f.y_low), w.sides.high[1] = side_of(f.y_high);
@@ -250,7 +290,9 @@ coupling::Water water_of(const cases::Case& c, const cases::Stage& stage, const 
   return w;
 }
 
-// Whether the stage asks for just what drives the grains already.
+double duration_of(const cases::Stage& stage, const output::Checkpoint& now);
+
+// Whether the stage asks for just what drives the grains already, and that lasts for it.
 bool goes_on(const cases::Case& c, const cases::Stage& stage, const Start& start, const dem::Vec3d& box,
              const output::Checkpoint& now) {
   if (!now.state.staggered || stage.zero_kinematics || stage.clear_history) return false;
@@ -261,13 +303,17 @@ bool goes_on(const cases::Case& c, const cases::Stage& stage, const Start& start
   scene.time_0 = before.time_0, scene.step_0 = before.step_0;
   scene.exchange_interval = before.exchange_interval;
   scene.neighbour_margin = before.neighbour_margin;
+  if (histories_of(stage) != now.histories) return false;
+  set_pieces(scene, now.histories, now.state.step);
   coupling::Water water = water_of(c, stage, scene, now.height_0, now.state);
   water.solver = now.water_settings.solver, water.tolerance = now.water_settings.tolerance;
-  return scene == before && water == now.water_settings;
+  if (scene != before || water != now.water_settings) return false;
+  const double end = now.start.end + duration_of(stage, now);
+  return cover(now.histories, end) && pressures_cover(water, end);
 }
 
 double nominal_rate(const cases::Stage& stage, const output::Checkpoint& now) {  // 1/s, u/H_0 or axial
-  return shears(stage.kind) ? layer_velocity(now.scene) / now.height_0 : stage.strain_rate;
+  return shears(stage.kind) ? layer_velocity(stage, now.scene) / now.height_0 : stage.strain_rate;
 }
 
 double duration_of(const cases::Stage& stage, const output::Checkpoint& now) {  // s
@@ -341,6 +387,7 @@ Stage describe(const cases::Case& c, std::size_t index, const output::Checkpoint
   Stage out;
   out.name = stage.name, out.kind = stage.kind;
   out.scene = now.scene, out.water = now.water_settings, out.height_0 = now.height_0;
+  out.histories = now.histories;
   out.goes_on = true;
   out.first_step = now.start.step, out.first_time = now.start.clock, out.end = now.start.end;
   out.diameter = mean_diameter(now.state);
@@ -380,11 +427,16 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, outpu
   dem::Scene scene = scene_of(c, stage, start, box, now.height_0);
   dem::sort_spatially(scene, s);
   scene.dt = c.automatic_dt ? c.safety * critical_step(scene, s) : step_of(c, stage, scene, s);
+  now.histories = histories_of(stage);
+  set_pieces(scene, now.histories, s.step);
   now.scene = scene;
   now.water_settings = water_of(c, stage, scene, now.height_0, s);
   now.critical_step = 0, now.critical_at = 0;
   now.start = {};
   now.start.end = duration_of(stage, now);
+  if (!cover(now.histories, now.start.end) || !pressures_cover(now.water_settings, now.start.end))
+    throw error("stage ", stage.name, ": lasts ", now.start.end,
+                " s, longer than one of its loads; expected values up to there, or a shorter stage");
   Stage out = describe(c, index, now);
   out.goes_on = false, out.warnings = warnings;
   if (c.automatic_dt) fit_step(out, s, scene.dt), now.scene = out.scene;

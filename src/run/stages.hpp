@@ -10,6 +10,7 @@
 #include "dem/scene.hpp"
 #include "dem/state.hpp"
 #include "output/files.hpp"
+#include "run/histories.hpp"
 #include "run/layers.hpp"
 
 namespace moraine::run {
@@ -21,7 +22,7 @@ struct Start {
   double wall_mass;                  // kg
   std::vector<dem::BodyId> roles{};  // by id: the layers of stages that shear; empty: by height
   std::string note{};                // for the log, about the grains
-  std::string inputs{};              // files that the grains come from, with their digests
+  std::string inputs{};              // files that grains and loads come from, with their digests
 };
 // Draws the grains, or reads them from case.start.
 Start start_of(const cases::Case& c);
@@ -39,6 +40,7 @@ struct Stage {
   double height_0;                            // m, H_0 of strain and dilation
   double diameter;                            // m, mean of the grains
   double strain_rate;                         // 1/s, nominal: u/H_0, axial, or of each side
+  Histories histories;                        // that bodies follow; the scene has the present pieces
   double porosity, pressure;                  // 1, Pa: what the grains are pressed to; 0: not
   std::vector<std::string> warnings;
 
@@ -47,7 +49,11 @@ struct Stage {
 
 // Whether the kind of stage drives a layer of grains along x.
 bool shears(cases::Stage::Kind kind);
-double layer_velocity(const dem::Scene& scene);  // m/s, given to the top layer; 0 where none is given
+// m/s, given to the top layer; 0 where none is given. Of one that changes the largest there is to come.
+double layer_velocity(const cases::Stage& stage, const dem::Scene& scene);
+// Files besides the case that it reads: grains, then loads.
+std::vector<std::filesystem::path> input_files(const cases::Case& c);
+std::string input(const std::filesystem::path& file);  // its name and digest, as they are now
 void take_layers_away(dem::Scene& scene);
 
 // Makes the grains of `now` ready for stage `index` of the case and returns what drives them; scene,

@@ -110,7 +110,7 @@ TEST(WideGrains, FillNoMoreThanTheSpace) {
   grid.n = {6, 6, 6}, grid.length = {0.34, 0.34, 0.3};
   Mapping mapping;
   mapping.build(grid, {}, rows.data(), bed.state.x, std::vector<double>(rows.size(), 1),
-                std::vector<bool>(rows.size(), false));
+                std::vector<double>(rows.size(), 0));
   double most = 0;
   for (const auto& axis : mapping.solid_fraction())
     for (const double psi : axis) most = std::max(most, psi);

@@ -27,7 +27,9 @@ inline std::vector<NamedBed> named_beds(const Bed& open, const Bed& walled, cons
                           {"a side wall moves in", squeezed_bed(walled)},
                           {"sheared along side walls", sheared_between_walls(walled)},
                           {"sizes 1:20, damped, softening", sheared_graded_bed(graded)},
-                          {"sizes 1:20, held height", sheared_graded_bed(graded)}};
+                          {"sizes 1:20, held height", sheared_graded_bed(graded)},
+                          {"a velocity that changes, with a profile, on a slope", sheared_bed(open)},
+                          {"stresses that change", sheared_bed(open)}};
   for (ContactParameters& p : a[1].bed.scene.contact) p.mu_d = 0.3;
   drive_top_layer(a[2].bed.scene, Drive::by(400));
   damp_grains(a[2].bed.scene, 5);
@@ -40,6 +42,12 @@ inline std::vector<NamedBed> named_beds(const Bed& open, const Bed& walled, cons
   damp_grains(a[11].bed.scene, 0.2);
   for (ContactParameters& p : a[11].bed.scene.contact) p.mu_d = 0.3;
   drive_top_layer(a[12].bed.scene, Drive::at(0.2), true);
+  Scene& uneven = a[13].bed.scene;
+  uneven.down = {std::sin(0.1), 0, -std::cos(0.1)};
+  drive_top_layer(uneven, changing_velocity());
+  damp_grains(uneven, 5);
+  a[14].bed.scene.body(BodyId::top_wall).z.rate = 2e4;
+  drive_top_layer(a[14].bed.scene, changing_stress());
   return a;
 }
 

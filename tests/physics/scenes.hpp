@@ -48,6 +48,19 @@ inline void drive_top_layer(Scene& s, const Drive& along_x, bool hold_z = false)
   s.body(BodyId::top_layer) = layer(along_x, hold_z);
 }
 
+// Of a layer.
+inline Drive changing_velocity() {
+  return {.kind = Drive::Kind::velocity,
+          .velocity = 0.1,
+          .amplitude = 0.05,
+          .frequency = 40,
+          .rate = 2,
+          .profile = Profile::cosine};
+}
+inline Drive changing_stress() {
+  return {.kind = Drive::Kind::stress, .mean = 100, .amplitude = 50, .frequency = 30, .rate = 5e3};
+}
+
 // Grains alone: no gravity, no walls, no periodic sides.
 inline Scene empty_space(double k) {
   Scene s;

@@ -40,6 +40,12 @@ std::vector<Variant> variants() {
   all.push_back({"sizes 1:20, damped", sheared_graded_bed(), 10});
   all.back().bed.scene.with(Material::grain).gamma_n = all.back().bed.scene.with(Material::grain).gamma_t =
       0.2;
+  all.push_back({"a velocity that changes, with a profile", sheared_bed()});
+  drive_top_layer(all.back().bed.scene, changing_velocity());
+  all.push_back({"stresses that change, on a slope", sheared_bed()});
+  drive_top_layer(all.back().bed.scene, changing_stress());
+  all.back().bed.scene.body(BodyId::top_wall).z.rate = 2e4;
+  all.back().bed.scene.down = {std::sin(0.1), 0, -std::cos(0.1)};
   return all;
 }
 

@@ -69,6 +69,18 @@ class GradedRestart : public Restart {
   GradedRestart() { text = graded_case(); }
 };
 
+class LoadedRestart : public Restart {  // by loads that change
+ protected:
+  LoadedRestart() {
+    text +=
+        "\n[[stage]]\nname = \"pulses\"\nkind = \"shear\"\nduration = 0.3\nprofile = \"linear\"\n"
+        "normal_stress = { times = [0, 0.07, 0.2, 0.4], values = [2000, 1000, 3000, 2000] }\n"
+        "velocity = { times = [0, 0.1, 0.2, 0.4], values = [0.1, -0.1, 0.3, 0], interpolation = \"steps\" }\n"
+        "velocity_amplitude = 0.02\nvelocity_frequency = 30\n";
+  }
+};
+
+TEST_F(LoadedRestart, TenKillsAtRandomMoments) { survive_ten_kills(0.25); }
 TEST_F(Restart, TenKillsAtRandomMoments) { survive_ten_kills(0.25); }
 TEST_F(GradedRestart, TenKillsAtRandomMoments) { survive_ten_kills(0.25); }
 

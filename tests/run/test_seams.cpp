@@ -67,6 +67,36 @@ const Kind kinds[] = {
      0.0625},
     {"undrained", "[fluid]\nenabled = true\ncompressibility = 1e-6\nexchange_interval = 1\n",
      "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\nfluid_top = \"impermeable\"\n", 0.0625},
+    {"ramp", "",
+     "kind = \"consolidate\"\nwall_gamma_n = 40\nwall_gamma_t = 40\n"
+     "normal_stress = { ramp = [1000, 3000], over = 0.1 }\n",
+     0.0625},
+    {"steps", "",
+     "kind = \"shear\"\nnormal_stress = 2000\nhold_layer_height = true\n"
+     "velocity = { times = [0, 0.03, 0.07, 1], values = [0.1, -0.2, 0.3, 0.3], interpolation = \"steps\" }\n",
+     0.0625},
+    {"loads_that_swing_and_rise", "",
+     "kind = \"shear_stress\"\nnormal_stress = { times = [0, 0.02, 0.09, 1], values = [2000, 2500, 1500, "
+     "2000] }\n"
+     "normal_stress_amplitude = 300\nnormal_stress_frequency = 40\nshear_stress = { ramp = [0, 900], over = "
+     "0.03 }\nshear_stress_amplitude = 100\nshear_stress_frequency = 20\n",
+     0.0625},
+    {"profile_and_slope", "[model]\nslope = \"4 deg\"\n",
+     "kind = \"shear\"\nnormal_stress = 2000\nprofile = \"cosine\"\ngamma_n = 5\n"
+     "velocity = { ramp = [0, 0.3], over = 0.1 }\nvelocity_amplitude = 0.05\nvelocity_frequency = 20\n",
+     0.0625},
+    {"histories_of_a_bed_that_dt_follows", "[model]\ndt = \"auto\"\n",
+     "kind = \"shear\"\nnormal_stress = { ramp = [2000, 3000], over = 0.15 }\n"
+     "velocity = { times = [0, 0.1, 0.25], values = [0.1, 0.2, 0] }\n",
+     0.125},
+    {"wet_histories",
+     "[fluid]\nenabled = true\nviscosity = 1.8e-3\ncompressibility = 1e-6\npermeability_factor = 1e-9\n",
+     "kind = \"shear\"\nprofile = \"cosine\"\nnormal_stress = { ramp = [2000, 3000], over = 0.1 }\n"
+     "velocity = { times = [0, 0.02, 0.5], values = [0.05, 0.1, 0] }\nfluid_bottom = \"pressure\"\n"
+     "top_pressure = { times = [0, 0.03, 1], values = [0, 150, 100], interpolation = \"steps\" }\n"
+     "bottom_pressure = { ramp = [0, 200], over = 0.09 }\nbottom_pressure_amplitude = 50\n"
+     "bottom_pressure_frequency = 30\n",
+     0.0625},
     {"wet_settle", "[fluid]\nenabled = true\ncompressibility = 1e-6\nheight = 0.5\n",
      "kind = \"settle\"\nwall_gamma_n = 40\nwall_gamma_t = 40\n", 0.0625},
 };

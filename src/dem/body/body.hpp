@@ -30,7 +30,27 @@ constexpr BodyId planes[] = {BodyId::floor,  BodyId::top_wall, BodyId::x_low,
 
 const char* name_of(BodyId id);  // "the top wall"
 
-// What moves a body along one axis.
+// How the velocity of a layer is spread across y: shares of it between 0 and 1. `cosine` is
+// (1 - cos(2 pi y/L))/2, `half` moves grains at y < L/2 only.
+enum class Profile { uniform, linear, cosine, half };
+
+// The share at y; length: m, of the box along y. Without the library's cosine, so that every backend has the
+// same bits.
+MORAINE_HD double share_at(Profile profile, double y, double length) {
+  if (profile == Profile::uniform) return 1;
+  const double u = y / length - ::floor(y / length);
+  if (profile == Profile::linear) return u;
+  if (profile == Profile::half) return u < 0.5 ? 1 : 0;
+  const double a = std::numbers::pi * (u < 0.5 ? u : 1 - u), a2 = a * a;  // sin(a)^2
+  double sum = 0;
+  for (int k = 25; k > 1; k -= 2) sum = fma(-a2 / (k * (k - 1)), sum, -a2 / (k * (k - 1)));
+  const double sine = fma(a, sum, a);
+  return sine * sine;
+}
+
+// What moves a body along one axis: with a velocity or a stress, either of them a value that may grow at an
+// even rate, and a sinusoid. What else there is against time (history.hpp) comes piece by piece, by
+// Engine::redrive().
 struct Drive {
   enum class Kind {
     held,
@@ -42,17 +62,29 @@ struct Drive {
   double velocity = 0;  // m/s
   double mean =
       0;  // Pa, over the box's horizontal section: of a plane pressing on the bed, of a layer along the axis
-  double amplitude = 0;  // Pa, of the sinusoid mean + amplitude sin(2 pi frequency t + phase)
-  double frequency = 0;  // Hz
-  double phase = 0;      // rad
+  double amplitude = 0;    // of a sinusoid, amplitude sin(2 pi frequency t + phase), in the unit of the value
+  double frequency = 0;    // Hz
+  double phase = 0;        // rad
+  double rate = 0;         // of the value, its unit/s
+  double since = 0;        // s, when the value was velocity or mean
+  bool piecewise = false;  // other pieces are to come
+  Profile profile = Profile::uniform;  // of a layer's velocity
 
-  MORAINE_HD double stress(double t) const {  // Pa; t in s since the stage began
-    return mean + (amplitude != 0 ? amplitude * ::sin(2 * std::numbers::pi * frequency * t + phase) : 0);
-  }
+  // t in s since the stage began.
+  MORAINE_HD double stress(double t) const { return at_time(mean, t); }           // Pa
+  MORAINE_HD double velocity_at(double t) const { return at_time(velocity, t); }  // m/s
+  // Whether a velocity does not stay the same.
+  MORAINE_HD bool changes() const { return piecewise || rate != 0 || amplitude != 0; }
   bool operator==(const Drive&) const = default;
 
   static Drive at(double velocity) { return {.kind = Kind::velocity, .velocity = velocity}; }
   static Drive by(double stress) { return {.kind = Kind::stress, .mean = stress}; }
+
+ private:
+  MORAINE_HD double at_time(double value, double t) const {
+    if (rate != 0) value = fma(rate, t - since, value);
+    return value + (amplitude != 0 ? amplitude * ::sin(2 * std::numbers::pi * frequency * t + phase) : 0);
+  }
 };
 
 // The materials of bodies. All grains are of one so far.

@@ -41,11 +41,15 @@ Servo servo_of(const Scene& scene, const State& s, BodyId id, int axis, int plan
   Servo servo;
   servo.body = id, servo.axis = axis, servo.plane = plane, servo.drive = b.along(axis);
   servo.facing = plane >= 0 ? b.facing : 1;
-  servo.v = servo.by_stress() ? s.at(id).v[axis] : b.along(axis).velocity;
+  const bool under_way = servo.by_stress() || (s.staggered && servo.drive.changes());
+  servo.v = under_way ? s.at(id).v[axis] : servo.drive.velocity_at(scene.time(s.step));
   servo.mass = b.mass;
   if (plane < 0)
     for (Index i = 0; i < s.size(); ++i)
-      if (s.part_of[i] == id) servo.mass += scene.inertial_mass(s.r[i]);
+      if (s.part_of[i] == id) {
+        const double share = servo.share(scene, s.x[i]);
+        servo.mass += share * share * scene.inertial_mass(s.r[i]);
+      }
   return servo;
 }
 

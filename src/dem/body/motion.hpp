@@ -12,7 +12,7 @@ constexpr int most_servos = 4, most_planes = 6;
 
 // What grains do to bodies at one step: sums over grains, each in a fixed order (sums.hpp).
 struct Reaction {
-  double force[most_servos] = {};  // N, on each servo's body along its axis
+  double force[most_servos] = {};  // N, on each servo's body along its axis; a layer's grains by their shares
 };
 
 // A plane where a step finds it.
@@ -43,9 +43,18 @@ struct Servo {
   double force = 0, force_before = 0;    // N, of the grains, now and one step earlier
   double water = 0, water_before = 0;    // N; zero where the bed is dry
   double stress = 0, stress_before = 0;  // Pa, asked for
+  double thrust = 0, thrust_before = 0;  // N, that a layer's mass needs where its velocity changes
 
   MORAINE_HD bool is_plane() const { return plane >= 0; }
   MORAINE_HD bool by_stress() const { return drive.kind == Drive::Kind::stress; }
+  // Whether grains of the layer have to be told its velocity at each step.
+  MORAINE_HD bool tells_grains() const { return by_stress() || drive.changes(); }
+  // A given velocity in the middle of the step that begins, m/s; t: s, of the step.
+  MORAINE_HD double next_velocity(double t, double dt) const { return drive.velocity_at(t + 0.5 * dt); }
+  // Of this velocity, by which a grain of the layer moves; its place never changes across x.
+  MORAINE_HD double share(const Scene& s, const Vec3d& x) const {
+    return share_at(drive.profile, x.y, s.box.y);
+  }
 
   MORAINE_HD double acceleration(double area) const {  // m/s2
     if (!by_stress()) return 0;
@@ -72,7 +81,8 @@ struct BodyMotion {
       const Servo& b = servo[k];
       const double by_drive =
           b.by_stress() ? b.facing * b.work(0.5 * (b.stress_before + b.stress) * s.area(), s.dt)
-                        : -b.work(0.5 * ((b.force_before + b.force) + (b.water_before + b.water)), s.dt);
+                        : b.work(0.5 * (b.thrust_before + b.thrust), s.dt) -
+                              b.work(0.5 * ((b.force_before + b.force) + (b.water_before + b.water)), s.dt);
       (b.is_plane() ? ledger.planes : ledger.layers) += by_drive;
     }
     ledger.water += by_water.work;
@@ -82,7 +92,21 @@ struct BodyMotion {
     for (int k = 0; k < servos; ++k) {
       Servo& b = servo[k];
       b.force = reaction.force[k], b.water = of(by_water, b);
-      b.stress = b.by_stress() ? b.drive.stress(s.time(step)) : 0;
+      ask(s, b);
+    }
+  }
+  // What the drive asks for at the present step.
+  MORAINE_HD void ask(const Scene& s, Servo& b) const {
+    const double t = s.time(step);
+    b.stress = b.by_stress() ? b.drive.stress(t) : 0;
+    const bool heaves = !b.is_plane() && !b.by_stress() && b.drive.changes();
+    b.thrust = heaves ? b.mass * ((b.next_velocity(t, s.dt) - b.v) / s.dt) : 0;
+  }
+  // Drives of other bodies from here on; of the same kinds.
+  MORAINE_HD void redrive(const Scene& s) {
+    for (int k = 0; k < servos; ++k) {
+      servo[k].drive = s.body(servo[k].body).along(servo[k].axis);
+      ask(s, servo[k]);
     }
   }
 
@@ -90,17 +114,25 @@ struct BodyMotion {
   MORAINE_HD void advance(const Scene& s) {
     for (int k = 0; k < servos; ++k) {
       Servo& b = servo[k];
-      b.force_before = b.force, b.water_before = b.water, b.stress_before = b.stress;
-      b.v = fma(b.acceleration(s.area()), s.dt, b.v);
+      b.force_before = b.force, b.water_before = b.water;
+      b.stress_before = b.stress, b.thrust_before = b.thrust;
+      b.v = b.by_stress() ? fma(b.acceleration(s.area()), s.dt, b.v) : b.next_velocity(s.time(step), s.dt);
       b.dx = b.v * s.dt;
       if (b.is_plane() && plane[b.plane].axis == b.axis) plane[b.plane].place += b.dx;
     }
     tell_planes();
     ++step;
   }
+  // To the step from half a step earlier (sign 1), or back (-1).
   MORAINE_HD void half_step(const Scene& s, double sign) {
-    for (int k = 0; k < servos; ++k)
-      servo[k].v = fma(servo[k].acceleration(s.area()), sign * 0.5 * s.dt, servo[k].v);
+    const double t = s.time(step);
+    for (int k = 0; k < servos; ++k) {
+      Servo& b = servo[k];
+      if (b.by_stress())
+        b.v = fma(b.acceleration(s.area()), sign * 0.5 * s.dt, b.v);
+      else if (b.drive.changes())
+        b.v = sign > 0 ? 0.5 * (b.v + b.next_velocity(t, s.dt)) : b.next_velocity(t, -s.dt);
+    }
     tell_planes();
   }
   // A bound on the speed of any plane, m/s.

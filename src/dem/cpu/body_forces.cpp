@@ -43,13 +43,17 @@ void plane_forces(Bed& bed, Chunk& chunk, const ChunkStep& at) {
     if (bodies.servo[k].is_plane()) reaction.force[k] = force[k].total();
 }
 
-void layer_forces(Bed&, Chunk& chunk, const ChunkStep& at) {
+void layer_forces(Bed& bed, Chunk& chunk, const ChunkStep& at) {
   Reaction& reaction = chunk.at(at.bodies.step).reaction;
   for (int k = 0; k < at.bodies.servos; ++k) {
     const Servo& servo = at.bodies.servo[k];
     if (servo.is_plane()) continue;
     ChunkSum force;
-    for (const Index i : chunk.members[k]) force.add(i, at.load[i].f[servo.axis]);
+    if (servo.drive.profile == Profile::uniform)
+      for (const Index i : chunk.members[k]) force.add(i, at.load[i].f[servo.axis]);
+    else
+      for (const Index i : chunk.members[k])
+        force.add(i, servo.share(bed.scene, bed.grain.data()[i].x) * at.load[i].f[servo.axis]);
     reaction.force[k] = force.total();
   }
 }

@@ -12,12 +12,16 @@ constexpr int rows_ahead = 8;  // that it asks to write to
 enum class Viscous { no, yes };  // whether contacts dissipate by damping
 enum class Impulse { none, of_water };
 
-// A layer that a stress drives moves with its servo, whatever the forces on each of its grains.
+// A layer moves with its servo, whatever the forces on each of its grains. One that a stress drives has its
+// new velocity already; one that is given is known ahead.
 template <class Use>
-void for_each_servo_grain(const Chunk& chunk, const BodyMotion& bodies, Use&& use) {
-  for (int k = 0; k < bodies.servos; ++k)
-    if (bodies.servo[k].by_stress() && !bodies.servo[k].is_plane())
-      for (const Index i : chunk.members[k]) use(i, bodies.servo[k]);
+void for_each_servo_grain(const Scene& scene, const Chunk& chunk, const ChunkStep& at, Use&& use) {
+  for (int k = 0; k < at.bodies.servos; ++k) {
+    const Servo& s = at.bodies.servo[k];
+    if (s.is_plane() || !s.tells_grains()) continue;
+    const double v = s.by_stress() ? s.v : s.next_velocity(scene.time(at.step), scene.dt);
+    for (const Index i : chunk.members[k]) use(i, s, v);
+  }
 }
 
 template <Viscous viscous, Impulse impulse>
@@ -25,9 +29,12 @@ void move(Bed& bed, Chunk& chunk, const ChunkStep& at) {
   const Scene& scene = bed.scene;
   GrainRow* const grain = bed.grain.data();
   LoadRow* const loads = at.load;
-  for_each_servo_grain(chunk, at.bodies, [&](Index i, const Servo& s) { grain[i].v[s.axis] = s.v; });
+  for_each_servo_grain(scene, chunk, at, [&](Index i, const Servo& s, double v) {
+    grain[i].v[s.axis] = s.share(scene, grain[i].x) * v;
+  });
   const Row zero(0.0), dt(scene.dt, scene.dt, scene.dt, 0);
-  const Row all_three(1, 1, 1, 0), only_z(0, 0, 1, 0), usual_fall(0, 0, -scene.submerged_gravity(), 0);
+  const Row all_three(1, 1, 1, 0), only_z(0, 0, 1, 0), down(scene.down.x, scene.down.y, scene.down.z, 0);
+  const Row usual_fall = Row(scene.submerged_gravity()) * down;
   [[maybe_unused]] const Row steps(static_cast<double>(scene.exchange_interval));
   // The fourth numbers of these are energies.
   Row sum_f = zero, group_f = zero, sum_torque = zero, group_torque = zero, fastest2 = zero;
@@ -42,7 +49,7 @@ void move(Bed& bed, Chunk& chunk, const ChunkStep& at) {
     if constexpr (impulse == Impulse::of_water)
       if (at.push) force = fma(steps, row(at.push[i].f), f);
     Row fall = free ? usual_fall : zero;
-    if (free && g.r < scene.least_inertia) fall = Row(0, 0, -scene.fall(g.r), 0);
+    if (free && g.r < scene.least_inertia) fall = Row(scene.fall(g.r)) * down;
     const Row acceleration = fma(force, inverse_mass, fall);
     const Row spin_acceleration = torque * Row(g.inverse_inertia);
     Kinematics<Row> k{row(g.x), row(g.v), row(g.omega), row(g.rotation)};

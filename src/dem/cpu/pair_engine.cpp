@@ -28,6 +28,10 @@ class PairEngine final : public Engine {
   explicit PairEngine(int threads) : threads_wanted_(threads), threads_(std::max(1, threads)) {}
 
   void load(const Scene& scene, const State& state, FluidCoupling* fluid) override;
+  void redrive(const Scene& scene) override {
+    bed_.scene.bodies = scene.bodies;
+    control_.bodies.redrive(bed_.scene);
+  }
   void advance(std::int64_t steps) override;
   State state() const override;
   Counts counts() const override;

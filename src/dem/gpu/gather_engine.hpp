@@ -80,6 +80,13 @@ class GatherEngine final : public Engine {
     load(scene, begun, fluid);
   }
 
+  void redrive(const Scene& scene) override {
+    view_.scene.bodies = scene.bodies;
+    Control control = space_.read(control_.data());
+    control.bodies.redrive(view_.scene);
+    space_.write(control_.data(), control);
+  }
+
   void advance(std::int64_t steps) override {
     Control control = space_.read(control_.data());
     const std::int64_t end = control.bodies.step + steps;

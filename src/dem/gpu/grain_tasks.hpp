@@ -56,7 +56,9 @@ struct GrainTasks {
     for (int k = 0; k < bodies.servos; ++k) {
       const Servo& servo = bodies.servo[k];
       if (servo.is_plane() || servo.body != w.part_of[i]) continue;
-      tally.sum[w.tallies.force(k)] = load.f[servo.axis];
+      tally.sum[w.tallies.force(k)] = servo.drive.profile == Profile::uniform
+                                          ? load.f[servo.axis]
+                                          : servo.share(w.scene, w.grain[step & 1][i].x) * load.f[servo.axis];
     }
   }
 
@@ -64,7 +66,10 @@ struct GrainTasks {
   MORAINE_HD float motion(Index i, const LoadRow& load) const {
     GrainRow g = w.grain[step & 1][i];
     const Servo* const servo = servo_of(w.part_of[i]);
-    if (servo) g.v.set(servo->axis, servo->v);
+    if (servo)
+      g.v.set(servo->axis,
+              servo->share(w.scene, g.x) *
+                  (servo->by_stress() ? servo->v : servo->next_velocity(w.scene.time(step), w.scene.dt)));
     const Triple dt(Vec3d{w.scene.dt, w.scene.dt, w.scene.dt});
     const Mobility m = mobility(w.scene, g);
     const Triple acceleration = m.acceleration(pushed(i, load).f),
@@ -105,11 +110,12 @@ struct GrainTasks {
     return w.water ? with_water(w.scene, step, load, w.water[i].f) : load;
   }
 
-  // A layer that a stress drives moves with its servo, whatever the forces on each of its grains.
+  // A layer moves with its servo, whatever the forces on each of its grains; null where these have its
+  // velocity already.
   MORAINE_HD const Servo* servo_of(BodyId layer) const {
     if (layer == BodyId::none) return nullptr;
     for (int k = 0; k < bodies.servos; ++k)
-      if (bodies.servo[k].body == layer && bodies.servo[k].by_stress()) return &bodies.servo[k];
+      if (bodies.servo[k].body == layer && bodies.servo[k].tells_grains()) return &bodies.servo[k];
     return nullptr;
   }
 };
