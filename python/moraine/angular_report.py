@@ -63,13 +63,14 @@ class Run(study_runs.Run):
         turned = rotation.statistics(last)
         late = self.stage.snapshots[len(self.stage.snapshots) * 2 // 3:]
         contraction, at = self.contraction()
-        deep, late_rows = self.rows, self.rows["shear_strain"] >= strength.late * s.strain
+        half_way = self.rows["shear_strain"][np.argmax(self.rows["shear_friction"] >= s.peak / 2)]
+        late_rows = self.rows["shear_strain"] >= strength.late * s.strain
         settings = self.case.settings
         return {
             "packing": "loose" if self.kind.loose else "dense", "mu_roll": self.kind.mu_roll, "mu_s": self.kind.mu_s, "seed": self.seed, "sigma_0_kPa": self.sigma_0 / 1e3,
-            "grains": len(z), "strain": s.strain, "friction_peak": s.peak, "friction_peak_raw": s.peak_raw, "strain_peak": s.peak_strain, "friction_ultimate": s.ultimate,
-            "dilation_d": s.dilation, "contraction_d": contraction, "strain_contraction": at, "porosity_0": shearing.porosity_0(deep), "height_0_m": self.height_0,
-            "shear_zone_d": zone, "shear_zone_reach": free, "shear_zone_half_d": half, "coordination_late": deep["coordination"][late_rows].mean(),
+            "grains": len(z), "strain": s.strain, "friction_peak": s.peak, "friction_peak_raw": s.peak_raw, "strain_peak": s.peak_strain, "friction_ultimate": s.ultimate, "strain_half_peak": half_way,
+            "dilation_d": s.dilation, "contraction_d": contraction, "strain_contraction": at, "porosity_0": shearing.porosity_0(self.rows), "height_0_m": self.height_0,
+            "shear_zone_d": zone, "shear_zone_reach": free, "shear_zone_half_d": half, "coordination_late": self.rows["coordination"][late_rows].mean(),
             "rotation_mean_y": turned.mean[1], "rotation_variance_x": turned.variance[0], "rotation_variance_y": turned.variance[1], "rotation_variance_z": turned.variance[2],
             "opposite_spins": float(np.mean([section.opposite_spins(x) for x in late])),
             "inertia_number": compaction.inertia_number(abs(self.settings["strain_rate"]), self.diameter / 2, settings["grains"]["density"], self.sigma_0),
@@ -122,7 +123,7 @@ def strength_table(rows, kinds):
 def bed_tables(rows, kinds):
     """{normal stress: lines}: what the bed does, a line for each kind."""
     keys = {"porosity_0": ("porosity before shear", 3), "contraction_d": ("contraction in stage 1 (diameters)", 4), "strain_contraction": ("to the strain", 4),
-            "dilation_d": ("dilation at the end (diameters)", 2), "strain_peak": ("strain at the peak", 3), "shear_zone_d": ("shear zone, to 5 % (diameters)", 1),
+            "dilation_d": ("dilation at the end (diameters)", 2), "strain_half_peak": ("strain at half the peak", 4), "strain_peak": ("at the peak", 3), "shear_zone_d": ("shear zone, to 5 % (diameters)", 1),
             "shear_zone_half_d": ("depth of half the displacement", 1), "shear_zone_reach": ("share of the free depth", 2), "coordination_late": ("contacts a grain, last third", 2)}
     head = ["", *(name for name, _ in keys.values())]
     return head, {sigma: [[k.label, *(shown(own, key, digits) for key, (_, digits) in keys.items())] for k in kinds if (own := of_kind(rows, k, sigma))]
@@ -292,7 +293,7 @@ def build(study, output, notes=None, say=print):
     page.paragraph(f"{len(runs)} runs of {rows[0]['grains']:,} grains: seeds {', '.join(map(str, sorted({r.seed for r in runs})))}, normal stress "
                    f"{', '.join(f'{s / 1e3:g}' for s in sorted({r.sigma_0 for r in runs}))} kPa, preset {settings['model'].get('preset')}, sheared at {runs[0].settings['strain_rate']:g} 1/s to a strain of "
                    f"{max(r['strain'] for r in rows):.2f}. {np.nansum(values(rows, 'hours')):.2f} hours of runs, packing apart. This report: version {made_by}, on {machine()}, {date.today()}.")
-    page.paragraph("μ_r is the coefficient of rolling resistance between grains (contact.mu_roll): the couple at a contact is at most μ_r times normal force and radius. μ is their friction, 0.3 as in the paper "
+    page.paragraph("μ_r is the coefficient of rolling resistance between grains (contact.mu_roll): the couple at a contact is at most μ_r times the normal force times half a radius. μ is their friction, 0.3 as in the paper "
                    "where nothing else is said. Dense beds are pressed together without friction, loose ones with the friction and the rolling resistance that they are sheared with. "
                    "± is half of a 95 % interval: of φ and C from the fit over the runs, of all else over the packings.")
     page.heading("Strength, beside Table 2")

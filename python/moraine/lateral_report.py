@@ -159,7 +159,8 @@ class Run(study_runs.Run):
                     f"half_depth_d_{name}": self.half_depth(k)}
         if self.stage.wet:
             y, p = self.water_pressure()
-            out |= {f"water_kPa_{name}": p[self.strip(y) == k].mean() / 1e3 for k, name in enumerate(strips)}
+            here = np.interp(self.before[0], y, p, period=self.side)  # cells of the water are wider than columns
+            out |= {f"water_kPa_{name}": here[strip == k].mean() / 1e3 for k, name in enumerate(strips)}
         return out
 
 
