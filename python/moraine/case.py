@@ -229,10 +229,13 @@ class Case:
 
     @property
     def normal_stress(self):
-        """sigma_0 of the last stage that has one, Pa."""
+        """sigma_0 of the last stage that has one, Pa; of one that changes the largest in the series."""
         for stage in reversed(self.stages):
-            if stage.settings.get("normal_stress", 0) > 0:
-                return stage.settings["normal_stress"]
+            sigma_0 = stage.settings.get("normal_stress", 0)
+            if isinstance(sigma_0, dict):  # a history
+                sigma_0 = float(stage.series["asked_normal_stress"].max())
+            if sigma_0 > 0:
+                return sigma_0
         raise MissingData(f"{self.output}/case.toml: no stage has a normal_stress")
 
     @property

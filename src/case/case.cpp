@@ -67,6 +67,7 @@ class Reader {
   }
   const string& stated(const string& key) const { return entries_.at(key).stated; }
   string text(const string& key) const { return std::get<string>(entries_.at(key).value); }
+  bool by_default(const string& key) const { return entries_.at(key).stated.ends_with("(by default)"); }
   bool flag(const string& key) const { return std::get<bool>(entries_.at(key).value); }
   bool automatic_dt() const { return std::holds_alternative<string>(entries_.at("model.dt").value); }
 
@@ -83,6 +84,19 @@ void check_case(const Entries& entries) {
   const Reader c(entries);
   c.expect(c.number("contact.mu_d") <= c.number("contact.mu_s"), "contact.mu_d",
            "at most contact.mu_s = ", c.number("contact.mu_s"));
+  const bool hertz = c.text("contact.law") == "hertz";
+  for (const char* key : {"contact.young", "wall.young"}) {
+    c.expect(!hertz || c.number(key) > 0, key, "> 0 Pa with contact.law = \"hertz\"");
+    c.expect(hertz || c.number(key) == 0, key, "0 Pa, or contact.law = \"hertz\"");
+  }
+  for (const string table : {"contact.", "wall."})
+    for (const string couple : {"roll", "twist"}) {
+      const string k = table + "k_" + couple;
+      if (c.number(table + "mu_" + couple) == 0) continue;
+      c.expect(c.number(k) > 0, k, "> 0 N/m with mu_", couple, " > 0");
+      c.expect(!hertz || !c.by_default(k) || !c.by_default("contact.k_roll"), k,
+               "a stiffness in N/m: with contact.law = \"hertz\" it does not follow from k_t");
+    }
   const string radii = c.text("grains.distribution");
   const double r_min = c.number("grains.radius_min"), r_max = c.number("grains.radius_max");
   if (radii == "uniform" || radii == "fractal") {
@@ -257,6 +271,21 @@ void check_stage(const Entries& entries, const Entries& above, const Context& co
            "at most mu_s = ", s.number("stage.mu_s"));
 }
 
+// By the law, and by softening.
+void set_stiffness(Case& c) {
+  for (dem::ContactParameters* p : {&c.contact, &c.wall})
+    for (double* k : {&p->k_n, &p->k_t, &p->k_roll, &p->k_twist}) *k /= c.softening;
+  c.wall.k_n = c.contact.k_n;
+  if (c.law == Case::Law::linear) return;
+  const auto set = [&](dem::ContactParameters& p, const Elastic& other) {
+    const Elastic& grain = c.elastic;
+    p.k_n = p.k_t = 0;
+    p.E_star = dem::young_star(grain.young, grain.poisson, other.young, other.poisson) / c.softening;
+    p.G_star = dem::shear_star(grain.young, grain.poisson, other.young, other.poisson) / c.softening;
+  };
+  set(c.contact, c.elastic), set(c.wall, c.wall_elastic);
+}
+
 // The file that `start` names: itself, or the end of that case.
 fs::path start_file(const fs::path& directory, const Entry& entry) {
   const string start = std::get<string>(entry.value);
@@ -356,9 +385,8 @@ Case load_checked(const fs::path& directory, const std::vector<Override>& overri
     add_default(key, draft.entries, context);
     if (key.set) key.set(key, c, no_stage, draft.entries.at(key.name).value);
   }
-  for (double* k : {&c.contact.k_n, &c.contact.k_t, &c.wall.k_t}) *k /= c.softening;
-  c.wall.k_n = c.contact.k_n;
   check_case(draft.entries);
+  set_stiffness(c);
   c.start = start_file(directory, draft.entries.at("start"));
   const Entry& sieves = draft.entries.at("grains.sieves");
   c.grains.sieves = file_beside(directory, sieves, std::get<string>(sieves.value));

@@ -12,6 +12,13 @@
 
 namespace moraine::cases {
 
+// Of a material, for Hertz and Mindlin's law.
+struct Elastic {
+  double young;    // Pa
+  double poisson;  // 1
+  bool operator==(const Elastic&) const = default;
+};
+
 struct Grains {
   std::int64_t count;
   std::string distribution;                  // "lognormal", "uniform", "fractal", "sieves", "bimodal"
@@ -93,6 +100,7 @@ struct Stage {
   double gamma_n, gamma_t;            // N s/m, between grains
   double mu_s, mu_d;                  // between grains, in this stage
   double wall_gamma_n, wall_gamma_t;  // N s/m
+  double restitution, wall_restitution;
   double wall_mu;
   bool zero_kinematics;  // velocities, spins and rotations set to zero when the stage begins
   bool clear_history;    // tangential springs forgotten when the stage begins
@@ -142,8 +150,12 @@ struct Case {
   Grains grains;
   std::string preset;  // "none", or what filled f, softening and wall viscosity
   double softening;    // what the stiffnesses below have been divided by
-  // What contact.* and wall.* say (k_n of walls is that of contacts); stages have their own damping and
-  // friction.
+  enum class Law { linear, hertz };
+  Law law;
+  Elastic elastic, wall_elastic;
+  double restitution, wall_restitution;
+  // What contact.* and wall.* say, the law's stiffness included (k_n of walls is that of contacts); stages have
+  // their own damping and friction.
   dem::ContactParameters contact, wall;
   double wall_mass;         // kg; 0: 0.001 of the mass of N spheres as wide as a lattice cell
   double gravity;           // m/s2

@@ -141,6 +141,7 @@ std::vector<Key> make_keys() {
   using F = Fluid;
   constexpr auto fluid = &C::fluid;
   using P = dem::ContactParameters;
+  using E = Elastic;
   constexpr auto contact = &C::contact;
   constexpr auto wall = &C::wall;
   const string sheared = "shear, shear_stress", damped = "; settle, consolidate: ";
@@ -177,14 +178,31 @@ std::vector<Key> make_keys() {
       row<grains, &G::columns_y>("grains.columns_y", "", "10", ">= 1", "lattice cells along y"),
       row<grains, &G::cell>("grains.cell", "1", "2.1", ">= 1.05", "side of a lattice cell in largest grain diameters"),
 
-      row<contact, &P::k_n>("contact.k_n", "N/m", "1.16e9", "> 0", "normal stiffness"),
-      row<contact, &P::k_t>("contact.k_t", "N/m", "1.16e9", ">= 0", "tangential stiffness"),
+      row<&C::law>("contact.law", "", "\"linear\"", "linear | hertz", "linear springs k_n and k_t; or Hertz and Mindlin, of elastic spheres with young and poisson (k_n and k_t then do not count)"),
+      row<contact, &P::k_n>("contact.k_n", "N/m", "1.16e9", "> 0", "normal stiffness of linear springs"),
+      row<contact, &P::k_t>("contact.k_t", "N/m", "1.16e9", ">= 0", "tangential stiffness of linear springs"),
+      row<&C::elastic, &E::young>("contact.young", "Pa", "0", ">= 0", "hertz: Young's modulus"),
+      row<&C::elastic, &E::poisson>("contact.poisson", "1", "0.25", "0 .. 0.5", "hertz: Poisson's ratio"),
+      row<&C::restitution>("contact.restitution", "1", "1", "0.05 .. 1", "coefficient of restitution of two grains, by damping of the normal direction beside gamma_n; 1: none; a stage may have its own"),
       row<contact, &P::gamma_n>("contact.gamma_n", "N s/m", "0", ">= 0", "normal viscosity; a stage may have its own"),
       row<contact, &P::gamma_t>("contact.gamma_t", "N s/m", "0", ">= 0", "tangential viscosity; a stage may have its own"),
       row<contact, &P::mu_s>("contact.mu_s", "1", "0.3", ">= 0", "static friction; a stage may have its own"),
       row<contact, &P::mu_d>("contact.mu_d", "1", "contact.mu_s", ">= 0", "dynamic friction, at most mu_s; a stage may have its own"),
+      row<contact, &P::mu_roll>("contact.mu_roll", "1", "0", ">= 0", "resistance to rolling, of grains that are not round: the couple is at most mu_roll R f_n, 1/R = 1/r_i + 1/r_j; 0: none"),
+      row<contact, &P::k_roll>("contact.k_roll", "N/m", "contact.k_t", ">= 0", "stiffness against rolling before that, as a force at R"),
+      row<contact, &P::mu_twist>("contact.mu_twist", "1", "0", ">= 0", "resistance to twisting about the normal: the couple is at most mu_twist R f_n; 0: none"),
+      row<contact, &P::k_twist>("contact.k_twist", "N/m", "contact.k_roll", ">= 0", "stiffness against twisting before that, as a force at R"),
+      row<contact, &P::cohesion>("contact.cohesion", "N", "0", ">= 0", "constant pull of grains that touch, which friction does not see"),
 
       row<wall, &P::k_t>("wall.k_t", "N/m", "0", ">= 0", "tangential stiffness against walls; k_n is that of contacts"),
+      row<&C::wall_elastic, &E::young>("wall.young", "Pa", "contact.young", ">= 0", "hertz: Young's modulus of walls; slip at walls takes wall_mu"),
+      row<&C::wall_elastic, &E::poisson>("wall.poisson", "1", "contact.poisson", "0 .. 0.5", "hertz: Poisson's ratio of walls"),
+      row<&C::wall_restitution>("wall.restitution", "1", "1", "0.05 .. 1", "coefficient of restitution against walls, by damping beside their gamma_n; a stage may have its own"),
+      row<wall, &P::mu_roll>("wall.mu_roll", "1", "0", ">= 0", "resistance to rolling on walls, R = r"),
+      row<wall, &P::k_roll>("wall.k_roll", "N/m", "contact.k_roll", ">= 0", "stiffness against rolling on walls"),
+      row<wall, &P::mu_twist>("wall.mu_twist", "1", "0", ">= 0", "resistance to twisting on walls"),
+      row<wall, &P::k_twist>("wall.k_twist", "N/m", "wall.k_roll", ">= 0", "stiffness against twisting on walls"),
+      row<wall, &P::cohesion>("wall.cohesion", "N", "0", ">= 0", "constant pull of walls on grains that touch them"),
       row<&C::wall_mass>("wall.mass", "kg", "0", ">= 0", "of the top wall; 0: 0.001 of the mass of N spheres as wide as a lattice cell"),
       row<wall, &P::gamma_n>("wall.gamma_n", "N s/m", "1e4", ">= 0", "normal viscosity against walls while settling and consolidating; a stage may have its own"),
       row<wall, &P::gamma_t>("wall.gamma_t", "N s/m", "1e4", ">= 0", "tangential viscosity against walls, likewise"),
@@ -193,7 +211,7 @@ std::vector<Key> make_keys() {
       row<&C::slope>("model.slope", "rad", "0", "-1.57 .. 1.57", "of the ground, falling towards +x: gravity acts along (sin, 0, -cos) of it; x stays along the bed and z at right angles to it"),
       row<&C::density_scaling>("model.density_scaling", "m", "0", ">= 0", "density scaling by size, for a longer step: radii below this have the inertia of this one, and their own weight; 0: none"),
       row<&C::preset>("model.preset", "", "\"none\"", "none | paper | standard | fast", "accuracy against time: sets f, softening and the walls' viscosity where the case does not; see below"),
-      row<&C::softening>("model.softening", "1", "1", ">= 1", "k_n and k_t of grains and walls are divided by it; viscosities are not"),
+      row<&C::softening>("model.softening", "1", "1", ">= 1", "stiffnesses of grains and walls (k_n, k_t, young, k_roll, k_twist) are divided by it; viscosities are not"),
       {"model.f", Type::number, "1", "0.075", "> 0", "time step in units of sqrt(min m / max(k_n, k_t)), eq. 9; a stage may have its own", "", set_nothing},
       {"model.dt", Type::number, "s", "0", ">= 0 | auto", "time step; 0: by f; \"auto\": safety times the critical step of the present contact network", "", set_dt},
       row<&C::safety>("model.safety", "1", "0.5", "0.01 .. 1", "dt = \"auto\": share of the critical step"),
@@ -265,6 +283,8 @@ std::vector<Key> make_keys() {
       row<&S::mu_d>("stage.mu_d", "1", "contact.mu_d", ">= 0", "dynamic friction, at most mu_s"),
       row<&S::wall_gamma_n>("stage.wall_gamma_n", "N s/m", "0" + damped + "wall.gamma_n", ">= 0", "normal viscosity against walls"),
       row<&S::wall_gamma_t>("stage.wall_gamma_t", "N s/m", "0" + damped + "wall.gamma_t", ">= 0", "tangential viscosity against walls"),
+      row<&S::restitution>("stage.restitution", "1", "contact.restitution", "0.05 .. 1", "coefficient of restitution of two grains"),
+      row<&S::wall_restitution>("stage.wall_restitution", "1", "wall.restitution", "0.05 .. 1", "coefficient of restitution against walls"),
       row<&S::wall_mu>("stage.wall_mu", "1", "0" + damped + "stage.mu_d", ">= 0", "friction against walls"),
       row<&S::zero_kinematics>("stage.zero_kinematics", "", "true; another of its kind: false", "", "velocities, spins and rotations begin at zero; by default not where the stage before, or the last one of `start`, is of the same kind"),
       row<&S::clear_history>("stage.clear_history", "", "false", "", "tangential springs are forgotten when the stage begins"),

@@ -26,15 +26,17 @@ double solid_volume(const State& s) {
 BoxStress box_stress(const Scene& scene, const State& s) {
   const Sides sides = Sides::of(scene);
   BoxStress out;
-  double length2 = 0;
+  const ContactParameters& law = scene.with(Material::grain);
+  double stiffness = 0;  // sum of k l^2
   for (const ContactForce& c : contact_forces(scene, s)) {
     const Vec3d x_ij = nearest_image(sides, s.x[c.i] - s.x[c.j]);
     out.normal += times(c.f_n + c.f_t, x_ij);
-    length2 += dot(x_ij, x_ij);
+    const Geometry<double> g = between_grains(x_ij, s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]);
+    stiffness += stiffness_of(law, g) * dot(x_ij, x_ij);
   }
   const double volume = box_volume(scene);
   out.normal = (1 / volume) * out.normal;
-  out.stiffness = scene.with(Material::grain).k_n * length2 / (3 * volume);
+  out.stiffness = stiffness / (3 * volume);
   return out;
 }
 
@@ -44,9 +46,9 @@ SpringEnergy spring_energy(const Scene& scene, const State& s) {
   SpringEnergy e;
   for (const Contact& c : s.contacts) {
     const Vec3d x_ij = nearest_image(sides, s.x[c.i] - s.x[c.j]);
-    const double overlap = s.r[c.i] + s.r[c.j] - std::sqrt(dot(x_ij, x_ij));
-    if (overlap > 0) e.normal += GeneralLaw::stored_normal(law, overlap);
-    e.tangential += GeneralLaw::Friction::stored(law, c.spring.delta_t);
+    const Geometry<double> g = between_grains(x_ij, s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]);
+    if (g.delta_n < 0) e.normal += GeneralLaw::stored_normal(law, g, 0);
+    e.tangential += GeneralLaw::stored_tangential(law, g, c.spring);
   }
   return e;
 }

@@ -42,7 +42,7 @@ Velocities at_step(const Scene& scene, const State& s) {
 // Whether contacts remember the force of their dampers at the state's step. Else it is worked out from the
 // velocities at the step, which the engine foresaw a little differently.
 bool dampers_are_known(const Scene& scene, const State& s, Material material) {
-  return s.staggered && scene.ledger && Viscosity::used(scene.with(material));
+  return s.staggered && scene.ledger && Restitution::used(scene.with(material));
 }
 
 // Springs are left as they are, here and in for_each_contact. A plane that is gone bears nothing.
@@ -117,8 +117,7 @@ void mark_slipping(const Scene& scene, State& s) {
   for_each_contact(scene, s, [&](const Contact&, const Geometry<double>& g, const Vec3d& f) {
     Vec3d f_n = dot(f, g.n) * g.n;
     const Vec3d f_t = f - f_n;
-    if constexpr (GeneralLaw::has_more)
-      f_n -= GeneralLaw::more_normal(p, g) * g.n;  // the limit does not see it
+    f_n -= GeneralLaw::more_normal(p, g, 0.0) * g.n;  // the limit does not see it
     const double limit = (1 - rounding) * p.mu_d;
     const double f_t2 = dot(f_t, f_t), f_n2 = dot(f_n, f_n);
     slipping.push_back(f_t2 > 0 && f_t2 >= limit * limit * f_n2 ? 1 : 0);
@@ -178,8 +177,6 @@ Observation observe(const Scene& scene, const State& s, const Loads& loads) {
   const double area = scene.area();
   const bool has_wall = scene.has(BodyId::top_wall);
   const Velocities at = at_step(scene, s);
-  const std::vector<ContactForce> contacts = contact_forces(scene, s);
-  const std::vector<WallForce> walls = wall_forces(scene, s, at);
 
   double floor_force = 0;
   for (const WallForce& w : loads.walls)
@@ -216,19 +213,21 @@ Observation observe(const Scene& scene, const State& s, const Loads& loads) {
   }
 
   Energy& e = o.energy;
-  const auto stored_along = [](const ContactParameters& p, const Vec3d& delta_t) {
-    return GeneralLaw::Friction::stored(p, delta_t);
+  const Sides sides = Sides::of(scene);
+  const double dt = s.staggered ? scene.dt : 0;
+  const auto store = [&](const ContactParameters& p, const Geometry<double>& g, const Vec3d& v,
+                         const Spring<double>& spring) {
+    e.elastic_normal += GeneralLaw::stored_normal(p, g, -dt * dot(v, g.n));
+    e.elastic_tangential += GeneralLaw::stored_tangential(p, g, spring);
   };
-  const ContactParameters& grain = scene.with(Material::grain);
-  const auto of_plane = [&](BodyId id) -> const ContactParameters& {
-    return scene.with(scene.body(id).material);
-  };
-  for (const ContactForce& c : contacts) e.elastic_normal += GeneralLaw::stored_normal(grain, c.overlap);
-  for (const Contact& c : s.contacts) e.elastic_tangential += stored_along(grain, c.spring.delta_t);
-  for (const WallForce& w : walls)
-    e.elastic_normal += GeneralLaw::stored_normal(of_plane(w.wall), -w.delta_n);
+  for (const Contact& c : s.contacts)
+    store(scene.with(Material::grain),
+          between_grains(nearest_image(sides, s.x[c.i] - s.x[c.j]), s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]),
+          s.v[c.i] - s.v[c.j], c.spring);
+  const BodyMotion bodies = motion_of(scene, s);
   for (const WallContact& w : s.wall_contacts)
-    if (scene.has(w.wall)) e.elastic_tangential += stored_along(of_plane(w.wall), w.spring.delta_t);
+    if (const Plane* plane = bodies.find(w.wall))
+      store(scene.with(plane->material), plane->geometry(s.x[w.i], s.r[w.i]), s.v[w.i] - plane->v, w.spring);
 
   double net = 0;
   Index free = 0;
@@ -250,7 +249,6 @@ Observation observe(const Scene& scene, const State& s, const Loads& loads) {
     ++free;
   }
   if (free > 0 && normal_force > 0) o.unbalanced_force = net / free / normal_force;
-  const BodyMotion bodies = motion_of(scene, s);
   for (int k = 0; k < bodies.servos; ++k) {
     const Servo& servo = bodies.servo[k];
     if (!servo.by_stress()) continue;

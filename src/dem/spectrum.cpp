@@ -22,25 +22,30 @@ double inner(const Vector& a, const Vector& b) {
   return sum;
 }
 
-// What resists motion at a contact: a spring's k or a dashpot's gamma.
+// What resists motion at a contact: a spring's k (N/m, N m) or a dashpot's gamma.
 struct Resistance {
   double normal, tangential;
+  double rolling, twisting;  // of the couple, against the difference of both spins
 };
-Resistance springs(const ContactParameters& p) { return {p.k_n, p.mu_s > 0 ? p.k_t : 0}; }
-Resistance dashpots(const ContactParameters& p) { return {p.gamma_n, p.mu_s > 0 ? p.gamma_t : 0}; }
-
-using Resistances = std::array<Resistance, materials>;  // by what the grain touches
-Resistances of_contacts(const Scene& scene, Resistance of(const ContactParameters&)) {
-  Resistances all;
-  for (int m = 0; m < materials; ++m) all[m] = of(scene.contact[m]);
-  return all;
+Resistance springs(const ContactParameters& p, const Geometry<double>& g) {
+  const auto at = patch<GeneralLaw>(p, g);
+  const double arm2 = at.radius * at.radius;
+  return {GeneralLaw::Normal::stiffness(p, at.at()), p.mu_s > 0 ? GeneralLaw::Normal::k_t(p, at.at()) : 0,
+          Rolling::used(p) ? arm2 * p.k_roll : 0, Twisting::used(p) ? arm2 * p.k_twist : 0};
 }
+Resistance dashpots(const ContactParameters& p, const Geometry<double>& g) {
+  const auto at = patch<GeneralLaw>(p, g);
+  const double gamma_n =
+      p.zeta > 0 ? Restitution::gamma_n<GeneralLaw::Normal>(p, g, at.at()) : p.gamma_n;
+  return {gamma_n, p.mu_s > 0 ? p.gamma_t : 0, 0, 0};
+}
+using ResistanceOf = Resistance (*)(const ContactParameters&, const Geometry<double>&);
 
 // v -> M^-1/2 K M^-1/2 v, contact by contact. Held directions have an infinite mass.
 class Network {
  public:
   Network(const Scene& scene, const State& s)
-      : n_(s.size()), freedoms_(6 * s.size() + 2), part_of_(s.part_of), motion_(2 * s.size() + 1) {
+      : scene_(scene), n_(s.size()), freedoms_(6 * s.size() + 2), part_of_(s.part_of), motion_(2 * s.size() + 1) {
     const auto root = [](double inverse_mass) { return std::sqrt(inverse_mass); };
     double layer_mass = 0;
     for (Index i = 0; i < n_; ++i) {
@@ -72,7 +77,7 @@ class Network {
   bool empty() const { return bonds_.empty(); }
 
   // y = A v
-  void apply(const Resistances& resistances, const Vector& v, Vector& y) {
+  void apply(ResistanceOf resistance, const Vector& v, Vector& y) {
     for (Index k = 0; k < 2 * n_; ++k)
       for (int a = 0; a < 3; ++a) motion_[k][a] = root_[k][a] * v[3 * k + a];
     const double layer = layer_root_ * v[6 * n_ + 1];
@@ -83,7 +88,7 @@ class Network {
 
     std::vector<Vec3d>& load = load_;
     load.assign(motion_.size(), Vec3d{0, 0, 0});
-    for (const Bond& b : bonds_) resist(b, resistances[static_cast<std::size_t>(b.material)], load);
+    for (const Bond& b : bonds_) resist(b, resistance(scene_.with(b.material), b.g), load);
 
     double layer_force = 0;
     for (Index i = 0; i < n_; ++i)
@@ -115,8 +120,14 @@ class Network {
     load[2 * b.i + 1] -= g.l_i * moment;
     if (b.j >= 0) load[2 * b.j] -= f;
     if (!b.at_plane) load[2 * b.j + 1] -= g.l_j * moment;
+    if (k.rolling == 0 && k.twisting == 0) return;
+    const Vec3d spin = motion_[2 * b.i + 1] - omega_j, twist = dot(spin, g.n) * g.n;
+    const Vec3d couple = axpy(k.rolling, spin - twist, k.twisting * twist);
+    load[2 * b.i + 1] += couple;
+    if (!b.at_plane) load[2 * b.j + 1] -= couple;
   }
 
+  const Scene& scene_;
   Index n_;
   std::size_t freedoms_;
   std::vector<BodyId> part_of_;
@@ -172,9 +183,9 @@ Vector start_vector(std::size_t size) {
 
 // Largest eigenvalue plus the residual of its vector. Without reorthogonalisation: that repeats eigenvalues
 // and invents none.
-double largest_eigenvalue(Network& network, const Resistances& resistances) {
+double largest_eigenvalue(Network& network, ResistanceOf resistance) {
   if (network.empty()) return 0;
-  const auto apply = [&](const Vector& v, Vector& y) { network.apply(resistances, v, y); };
+  const auto apply = [&](const Vector& v, Vector& y) { network.apply(resistance, v, y); };
   Vector v, before(network.freedoms(), 0), next(network.freedoms());
   apply(start_vector(network.freedoms()), next);  // leaves the part that no contact resists behind
   v = next;
@@ -201,24 +212,25 @@ double largest_eigenvalue(Network& network, const Resistances& resistances) {
 
 double critical_step(double w2, double c) { return 2 / (c + std::sqrt(c * c + w2)); }
 
-// One contact of grains with these sums of 1/m and l^2/I (1/kg).
-double critical_step(const ContactParameters& p, double inverse_mass, double inverse_inertia) {
+// One contact of grains with these sums of 1/m and of 1/I, with an arm l.
+double critical_step(const ContactParameters& p, const Geometry<double>& g, double inverse_mass,
+                     double inverse_inertia, double arm) {
   const auto largest = [&](const Resistance& k) {
-    return std::max(k.normal * inverse_mass, k.tangential * (inverse_mass + inverse_inertia));
+    return std::max({k.normal * inverse_mass, k.tangential * (inverse_mass + arm * arm * inverse_inertia),
+                     std::max(k.rolling, k.twisting) * inverse_inertia});
   };
-  return critical_step(largest(springs(p)), largest(dashpots(p)));
+  return critical_step(largest(springs(p, g)), largest(dashpots(p, g)));
 }
 
 }  // namespace
 
 Spectrum spectrum(const Scene& scene, const State& state) {
   Network network(scene, state);
-  const Resistances damping = of_contacts(scene, dashpots);
   Spectrum s;
-  s.stiffness = largest_eigenvalue(network, of_contacts(scene, springs));
-  if (std::any_of(damping.begin(), damping.end(),
-                  [](const Resistance& c) { return c.normal > 0 || c.tangential > 0; }))
-    s.damping = largest_eigenvalue(network, damping);
+  s.stiffness = largest_eigenvalue(network, springs);
+  if (std::any_of(scene.contact.begin(), scene.contact.end(),
+                  [](const ContactParameters& p) { return Restitution::used(p); }))
+    s.damping = largest_eigenvalue(network, dashpots);
   return s;
 }
 
@@ -228,14 +240,16 @@ double critical_step(const Spectrum& s) {
 }
 
 double one_contact_step(const Scene& scene, const State& s) {
-  const double m = scene.inertial_mass(*std::min_element(s.r.begin(), s.r.end()));
-  const double turning = 2.5;  // m r^2/I of a sphere
-  double step = critical_step(scene.with(Material::grain), 2 / m, 2 * turning / m);
+  const double r = *std::min_element(s.r.begin(), s.r.end()), m = scene.inertial_mass(r);
+  const double inertia = 0.4 * m * r * r;
+  double step =
+      critical_step(scene.with(Material::grain), usual_contact(r, r), 2 / m, 2 / inertia, r);
   for (const BodyId id : planes) {
     const Body& plane = scene.body(id);
     if (!plane.is_there()) continue;
     const double inverse_mass = plane.along(plane.axis).kind == Drive::Kind::stress ? 1 / plane.mass : 0;
-    step = std::min(step, critical_step(scene.with(plane.material), 1 / m + inverse_mass, turning / m));
+    step = std::min(step, critical_step(scene.with(plane.material), usual_contact_at_plane(r),
+                                        1 / m + inverse_mass, 1 / inertia, r));
   }
   return step;
 }

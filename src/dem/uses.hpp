@@ -12,6 +12,9 @@ struct LawUses {
   bool friction = false;   // tangential springs and torques
   bool softening = false;  // mu_d < mu_s
   bool damping = false;
+  bool restitution = false;  // damping by a coefficient of restitution
+  bool linear = false, hertz = false;
+  bool couples = false;  // rolling or twisting
   bool operator==(const LawUses&) const = default;
 };
 struct Uses {
@@ -24,8 +27,15 @@ struct Uses {
 
 // What its parameters ask for.
 inline LawUses asked_by(const ContactParameters& p) {
-  const bool friction = p.mu_s > 0 && (p.k_t > 0 || p.gamma_t > 0);
-  return {friction, friction && SofteningCoulomb::keeps(p), Viscosity::used(p)};
+  const bool couples = Rolling::used(p) || Twisting::used(p);
+  const bool friction = couples || (p.mu_s > 0 && (p.k_t > 0 || p.gamma_t > 0 || p.G_star > 0));
+  return {.friction = friction,
+          .softening = friction && SofteningCoulomb::keeps(p),
+          .damping = Restitution::used(p),
+          .restitution = p.zeta > 0,
+          .linear = p.k_n > 0 || p.k_t > 0,
+          .hertz = p.E_star > 0,
+          .couples = couples};
 }
 inline Uses asked_by(const Scene& s) {
   return {asked_by(s.with(Material::grain)), s.has_planes() ? asked_by(s.with(Material::wall)) : LawUses{},
@@ -38,7 +48,8 @@ void with_laws(const Scene& s, Use&& use) {
   const Uses u = asked_by(s);
   const auto covers = [&]<class L>(const LawUses& asked, Material with, L*) {
     return L::rubs >= asked.friction && L::softens >= asked.softening && L::damps >= asked.damping &&
-           MoreParts::covered_by<L>(s.with(with));
+           L::restitutes >= asked.restitution && L::linear >= asked.linear && L::hertz >= asked.hertz &&
+           L::couples >= asked.couples && MoreParts::covered_by<L>(s.with(with));
   };
   const auto try_row = [&]<class Row>(Row*) {
     using Grains = typename Row::BetweenGrains;
@@ -72,8 +83,10 @@ inline Uses uses_of(const Scene& s) {
   with_laws(s, [&]<class Row, Account>() {
     using Grains = typename Row::BetweenGrains;
     using Planes = typename Row::AtPlanes;
-    u.grains = {Grains::rubs, Grains::softens, Grains::damps};
-    u.planes = {Planes::rubs, Planes::softens, Planes::damps};
+    const auto of = []<class L>(L*) {
+      return LawUses{L::rubs, L::softens, L::damps, L::restitutes, L::linear, L::hertz, L::couples};
+    };
+    u.grains = of(static_cast<Grains*>(nullptr)), u.planes = of(static_cast<Planes*>(nullptr));
   });
   return u;
 }

@@ -24,14 +24,14 @@ namespace {
 
 // Stiffness of the skeleton against uniaxial compression, Pa: contacts as linear springs, all of one length,
 // that follow the mean strain (M = K + 4/3 G; a real packing gives way to a half of that or less).
-double modulus(const cases::Case& c, const dem::State& s, double solid_fraction, double diameter) {
+double modulus(const dem::ContactParameters& p, const dem::State& s, double solid_fraction, double diameter) {
   const double z = s.contacts.empty() ? 5 : 2.0 * static_cast<double>(s.contacts.size()) / s.size();
   const double per_length = z * solid_fraction / (std::numbers::pi * diameter);
-  return per_length * (c.contact.k_n / 3 + 4.0 / 3 * (2 * c.contact.k_n + 3 * c.contact.k_t) / 10);
+  return per_length * (p.k_n / 3 + 4.0 / 3 * (2 * p.k_n + 3 * p.k_t) / 10);
 }
 
 void print_water(const cases::Case& c, const Stage& stage, const dem::State& s,
-                 const coupling::PoreWater& water, double height, double strain_rate) {
+                 const coupling::PoreWater& water, double height, double strain_rate, double pressure) {
   const coupling::Water& w = stage.water;
   double volume = 0;
   for (const double r : s.r) volume += dem::sphere_volume(r);
@@ -39,7 +39,8 @@ void print_water(const cases::Case& c, const Stage& stage, const dem::State& s,
       std::clamp(1 - volume / (stage.scene.area() * height), w.porosity_range[0], w.porosity_range[1]);
   const double sauter = sauter_diameter(s), k_c = w.k_c > 0 ? w.k_c : sauter * sauter / 180,
                k = k_c * phi * phi * phi / ((1 - phi) * (1 - phi));
-  const double m = modulus(c, s, 1 - phi, stage.diameter), storage = phi * w.compressibility;
+  const dem::ContactParameters springs = dem::as_linear(c.contact, 0.5 * stage.diameter, pressure);
+  const double m = modulus(springs, s, 1 - phi, stage.diameter), storage = phi * w.compressibility;
   const double d = k / (w.viscosity * storage), c_v = k / (w.viscosity * (1 / m + storage));
   const coupling::Stability stability = water.stability();
   const bool wall = stage.scene.has(dem::BodyId::top_wall);
@@ -88,15 +89,22 @@ void print_mixture(const cases::Grains& g, const dem::State& s, double volume) {
       coarse, 2 * middle, fine / volume, g.fine_fraction);
 }
 
+// Pa, mean of the grains' own weight.
+double weight_above(const dem::Scene& scene, const dem::State& s) {
+  double volume = 0;
+  for (const double r : s.r) volume += dem::sphere_volume(r);
+  return 0.5 * scene.density * volume * scene.submerged_gravity() / scene.area();
+}
+
 constexpr double long_run = 7 * 86400, short_step = 1e-9, a_day = 86400;  // s
 
 // The step goes as r^1.5 k^-0.5, by the smallest grain.
 void print_what_would_do(const cases::Case& c, const dem::GradingSummary& sizes, double total) {
   std::printf(
-      "  shorter       the smallest grain, %.3g m wide, and k_n = %.3g N/m set the step: a tenth of the time "
+      "  shorter       the smallest grain, %.3g m wide, and the stiffness set the step: a tenth of the time "
       "with "
       "4.6 times larger ones",
-      sizes.smallest, c.contact.k_n);
+      sizes.smallest);
   const std::string where = !c.start.empty()                       ? "in the start"
                             : c.grains.distribution == "sieves"    ? "grains.sieves"
                             : c.grains.distribution == "lognormal" ? "grains.radius_min, or radius_mean"
@@ -219,10 +227,10 @@ void check_case(const Options& options) {
       std::printf("    dt = auto   %.3g of the critical step, as the contacts come and go\n", c.safety);
     const double pressure = std::max(wanted.normal_stress, wanted.pressure);
     if (pressure > 0) {
-      const double r = 0.5 * diameter;
+      const double r = 0.5 * diameter, k_n = dem::as_linear(c.contact, r, pressure).k_n;
       std::printf(
-          "    stiffness   k_n/(sigma_0 d) = %.3g%s\n", c.contact.k_n / (pressure * diameter),
-          c.contact.k_n / (pressure * diameter) < 1e4 ? "  (below 1e4: softer than rigid grains)" : "");
+          "    stiffness   k_n/(sigma_0 d) = %.3g%s\n", k_n / (pressure * diameter),
+          k_n / (pressure * diameter) < 1e4 ? "  (below 1e4: softer than rigid grains)" : "");
       if (strain_rate != 0) {
         const double inertia = std::abs(strain_rate) * r * std::sqrt(inertial_density / pressure);
         std::printf("    inertia     I = %.3g (eq. 1)%s\n", inertia,
@@ -231,7 +239,7 @@ void check_case(const Options& options) {
     }
     if (const auto water = fill(stage, s, now.water, stage.goes_on))
       print_water(c, stage, s, *water, wanted.kind == cases::Stage::Kind::settle ? settled : stage.height_0,
-                  strain_rate);
+                  strain_rate, pressure > 0 ? pressure : weight_above(scene, s));
     if (unknown.empty())
       std::printf("    time        about %s at %.3g ms a step\n", readable_time(time.seconds).c_str(),
                   time.ms());

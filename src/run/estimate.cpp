@@ -107,9 +107,11 @@ void Estimate::pack() {
   scene.box = {start_.box_x, start_.box_y, 0};
   scene.density = case_.grains.density, scene.gravity = 0, scene.ledger = false;
   const double mass = scene.inertial_mass(*std::min_element(r.begin(), r.end()));
-  scene.dt = 0.15 * std::sqrt(mass / case_.contact.k_n);
+  const double r_min = *std::min_element(r.begin(), r.end());
+  const double k_n = dem::stiffness_of(case_.contact, dem::usual_contact(r_min, r_min));
+  scene.dt = 0.15 * std::sqrt(mass / k_n);
   dem::ContactParameters smooth;
-  smooth.k_n = case_.contact.k_n, smooth.gamma_n = 0.5 * std::sqrt(mass * case_.contact.k_n);
+  smooth.k_n = k_n, smooth.gamma_n = 0.5 * std::sqrt(mass * k_n);
   smooth.k_t = smooth.mu_s = smooth.mu_d = 0;
   scene.contact.fill(smooth);
   scene.body(dem::BodyId::top_wall) = dem::top_wall();

@@ -23,13 +23,24 @@ struct Mode {
   bool certain;         // that these contacts exist
 };
 
+// With the stiffness and damping that the law has at the usual overlap of grains of radius r.
+dem::ContactParameters as_springs(dem::ContactParameters p, bool wall, double r) {
+  const dem::Geometry<double> g = wall ? dem::usual_contact_at_plane(r) : dem::usual_contact(r, r);
+  const auto at = dem::patch<dem::GeneralLaw>(p, g).at();
+  const double gamma_n = dem::Restitution::gamma_n<dem::GeneralLaw::Normal>(p, g, at);
+  const double k_n = dem::stiffness_of(p, g), k_t = dem::tangential_stiffness_of(p, g);
+  p.gamma_n = gamma_n, p.k_n = k_n, p.k_t = k_t;
+  return p;
+}
+
 // Of the smallest grain, radius r.
 std::vector<Mode> modes_of(const Stage& stage, const dem::State& s, double r) {
   const dem::Scene& scene = stage.scene;
   const double w = 1 / scene.inertial_mass(r);
   const auto sticks = [](const dem::ContactParameters& p, double value) { return p.mu_s > 0 ? value : 0; };
   std::vector<Mode> modes;
-  const auto add = [&](const dem::ContactParameters& p, bool wall, double bodies) {
+  const auto add = [&](const dem::ContactParameters& law, bool wall, double bodies) {
+    const dem::ContactParameters p = as_springs(law, wall, r);
     modes.push_back({wall ? "along the normal of a wall" : "along the normal of two grains",
                      wall ? "wall_gamma_n" : "gamma_n", p.k_n, p.gamma_n, bodies * w, true});
     modes.push_back({wall ? "along a wall" : "along the tangent of two grains",
@@ -37,8 +48,8 @@ std::vector<Mode> modes_of(const Stage& stage, const dem::State& s, double r) {
                      3.5 * bodies * w, true});
   };
   if (s.size() > 1) add(scene.with(dem::Material::grain), false, 2);
-  const dem::ContactParameters& at_walls = scene.with(dem::Material::wall);
-  if (scene.has_planes()) add(at_walls, true, 1);
+  const dem::ContactParameters at_walls = as_springs(scene.with(dem::Material::wall), true, r);
+  if (scene.has_planes()) add(scene.with(dem::Material::wall), true, 1);
   const dem::Body& top_wall = scene.body(dem::BodyId::top_wall);
   if (top_wall.z.kind == dem::Drive::Kind::stress) {
     const double layer = std::round(

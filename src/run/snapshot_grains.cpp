@@ -1,6 +1,7 @@
 #include "run/snapshot_grains.hpp"
 
 #include "dem/packing.hpp"
+#include "dem/periodic_sides.hpp"
 #include "error.hpp"
 #include "output/files.hpp"
 #include "output/sealed.hpp"
@@ -28,9 +29,18 @@ OwnGrains read_snapshot_grains(const cases::Case& c) {
   s.rotation = std::move(snapshot.rotation);
   s.wall_z() = snapshot.top_wall;
   own.roles = std::move(snapshot.role);
-  for (std::size_t k = 0; k < snapshot.i.size() && c.contact.k_t > 0; ++k) {
+  dem::Scene box;
+  box.box = {own.box_x, own.box_y, own.box_z};
+  box.periodic_x = c.periodic_x, box.periodic_y = c.periodic_y, box.periodic_z = c.periodic_z;
+  const dem::Sides sides = dem::Sides::of(box);
+  for (std::size_t k = 0; k < snapshot.i.size(); ++k) {
     dem::Contact contact{snapshot.i[k], snapshot.j[k], {}};
-    contact.spring.delta_t = -1 / c.contact.k_t * snapshot.f_t[k];
+    const double r_i = s.r[contact.i], r_j = s.r[contact.j];
+    const double k_t = dem::tangential_stiffness_of(
+        c.contact, dem::between_grains(dem::nearest_image(sides, s.x[contact.i] - s.x[contact.j]), r_i + r_j,
+                                       r_i - r_j));
+    if (!(k_t > 0)) continue;
+    contact.spring.delta_t = -1 / k_t * snapshot.f_t[k];
     s.contacts.push_back(contact);
   }
   own.note =

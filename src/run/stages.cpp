@@ -65,6 +65,10 @@ dem::Scene scene_of(const cases::Case& c, const cases::Stage& stage, const Start
   grain.gamma_n = stage.gamma_n, grain.gamma_t = stage.gamma_t;
   grain.mu_s = stage.mu_s, grain.mu_d = stage.mu_d;
   wall.gamma_n = stage.wall_gamma_n, wall.gamma_t = stage.wall_gamma_t;
+  grain.zeta = dem::damping_ratio(stage.restitution);
+  wall.zeta = dem::damping_ratio(stage.wall_restitution);
+  for (dem::ContactParameters& p : scene.contact)
+    p.density_i = p.density_j = scene.density, p.least_inertia = scene.least_inertia;
   wall.mu_s = wall.mu_d = stage.wall_mu;
   scene.neighbour_margin = c.neighbour_margin, scene.ledger = c.ledger;
   scene.fluid_density = stage.fluid ? c.fluid.density : 0;
@@ -141,11 +145,18 @@ double sauter_diameter(const dem::State& s) {
   return 2 * volume / area;
 }
 
-// dt = f sqrt(min m / max k), eq. 9; the walls count among the k.
+// dt = f sqrt(min m / max k), eq. 9; the walls count among the k. Of Hertz and Mindlin those at the usual
+// overlap.
 double step_by_eq_9(const dem::Scene& scene, const dem::State& s, double f) {
-  const double m = scene.inertial_mass(*std::min_element(s.r.begin(), s.r.end()));
+  const double r = *std::min_element(s.r.begin(), s.r.end()), m = scene.inertial_mass(r);
   double k = 0;
-  for (const dem::ContactParameters& p : scene.contact) k = std::max({k, p.k_n, p.k_t});
+  const auto take = [&](const dem::ContactParameters& p, const dem::Geometry<double>& g) {
+    k = std::max({k, dem::stiffness_of(p, g), dem::tangential_stiffness_of(p, g)});
+    if (dem::Rolling::used(p)) k = std::max(k, p.k_roll);
+    if (dem::Twisting::used(p)) k = std::max(k, p.k_twist);
+  };
+  take(scene.with(dem::Material::grain), dem::usual_contact(r, r));
+  take(scene.with(dem::Material::wall), dem::usual_contact_at_plane(r));
   return f * std::sqrt(m / k);
 }
 

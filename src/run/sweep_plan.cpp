@@ -41,9 +41,9 @@ std::vector<string> parts_of(const string& text) {
       if (c == quote) quote = 0;
     } else if (c == '"' || c == '\'') {
       quote = c;
-    } else if (c == '[') {
+    } else if (c == '[' || c == '{') {
       ++depth;
-    } else if (c == ']') {
+    } else if (c == ']' || c == '}') {
       --depth;
     }
     if (c == ',' && !quote && depth == 0)

@@ -44,14 +44,14 @@ Input any_input(Random& random) {
   q.before = {random.vector(1), random.vector(100), random.vector(100)};
   if (random(0, 1) < 0.8) q.spring.delta_t = random.vector(1e-4);
   q.spring.slipping = random(0, 1) < 0.5 ? 1 : 0;
+  q.spring.a_before = random(0, 3e-3), q.spring.rolled = random.vector(1e-4), q.spring.twisted = random(-1, 1) * 1e-4;
   if (random(0, 1) < 0.7) q.spring.v_before = random.vector(1), q.spring.f_viscous = random.vector(k * 1e-4);
   return q;
 }
 
 template <class L>
-void expect_lanes_equal_doubles() {
+void expect_lanes_equal_doubles(const ContactParameters& law = LinearContact{k, 0.7 * k, 5, 3, 0.5, 0.4}) {
   Random random(11);
-  const ContactParameters law = LinearContact{k, 0.7 * k, 5, 3, 0.5, 0.4};
   const double dt = 1e-5;
   for (int round = 0; round < 500; ++round) {
     Input q[4];
@@ -68,42 +68,43 @@ void expect_lanes_equal_doubles() {
     const auto g = between_grains<Pack>(vectors([](const Input& i) { return i.x; }),
                                         lanes([](const Input& i) { return i.r_i + i.r_j; }),
                                         lanes([](const Input& i) { return i.r_i - i.r_j; }));
-    Spring<Pack> spring{vectors([](const Input& i) { return i.spring.delta_t; }),
-                        lanes([](const Input& i) { return i.spring.slipping; }),
-                        vectors([](const Input& i) { return i.spring.v_before; }),
-                        vectors([](const Input& i) { return i.spring.f_viscous; })};
+    Spring<Pack> spring;
+    for (int l = 0; l < 4; ++l)
+      for_each_named(spring, q[l].spring, [l](const char*, auto& to, const auto& from) {
+        if constexpr (std::is_same_v<std::remove_cvref_t<decltype(from)>, double>)
+          to.v[l] = from;
+        else
+          to.x.v[l] = from.x, to.y.v[l] = from.y, to.z.v[l] = from.z;
+      });
     const Action<Pack> a = contact_law<L, energy>(law, dt, g, motion, spring);
 
     for (int l = 0; l < 4; ++l) {
       Spring<double> s = q[l].spring;
       const auto g1 = between_grains(q[l].x, q[l].r_i + q[l].r_j, q[l].r_i - q[l].r_j);
       const Action<double> b = contact_law<L, energy>(law, dt, g1, q[l].before, s);
-      const double got[] = {a.f.x[l],
-                            a.f.y[l],
-                            a.f.z[l],
-                            a.f_x_n.x[l],
-                            a.f_x_n.y[l],
-                            a.f_x_n.z[l],
-                            a.slip[l],
-                            a.viscous[l],
-                            spring.delta_t.x[l],
-                            spring.delta_t.y[l],
-                            spring.delta_t.z[l],
-                            spring.slipping[l],
-                            spring.v_before.x[l],
-                            spring.v_before.y[l],
-                            spring.v_before.z[l],
-                            spring.f_viscous.x[l],
-                            spring.f_viscous.y[l],
-                            spring.f_viscous.z[l]};
-      const double expected[] = {b.f.x,         b.f.y,         b.f.z,        b.f_x_n.x,    b.f_x_n.y,
-                                 b.f_x_n.z,     b.slip,        b.viscous,    s.delta_t.x,  s.delta_t.y,
-                                 s.delta_t.z,   s.slipping,    s.v_before.x, s.v_before.y, s.v_before.z,
-                                 s.f_viscous.x, s.f_viscous.y, s.f_viscous.z};
-      for (std::size_t c = 0; c < std::size(got); ++c)
-        ASSERT_EQ(std::memcmp(&got[c], &expected[c], 8), 0) << "component " << c;
+      const auto same = [&](const Pack& lane, double number, const char* what) {
+        const double got = lane[l];
+        ASSERT_EQ(std::memcmp(&got, &number, 8), 0) << what << ' ' << got << ' ' << number;
+      };
+      const auto equal = [&](const char* what, const auto& lanes, const auto& number) {
+        if constexpr (std::is_same_v<std::remove_cvref_t<decltype(number)>, double>)
+          same(lanes, number, what);
+        else
+          same(lanes.x, number.x, what), same(lanes.y, number.y, what), same(lanes.z, number.z, what);
+      };
+      equal("f", a.f, b.f), equal("f_x_n", a.f_x_n, b.f_x_n), equal("couple", a.couple, b.couple);
+      equal("slip", a.slip, b.slip), equal("viscous", a.viscous, b.viscous);
+      for_each_named(spring, s, equal);
     }
   }
+}
+
+// Hertz and Mindlin's law with all parts.
+ContactParameters everything() {
+  ContactParameters p = LinearContact{0, 0, 5, 3, 0.5, 0.4};
+  p.E_star = 1e8, p.G_star = 4e7, p.zeta = 0.2, p.density_i = p.density_j = 2600, p.least_inertia = 0.009;
+  p.k_roll = 0.5 * k, p.mu_roll = 0.1, p.k_twist = 0.3 * k, p.mu_twist = 0.05, p.cohesion = 3;
+  return p;
 }
 
 TEST(ContactLaw, LanesOfAPackGiveTheBitsOfDoubles) {
@@ -111,6 +112,8 @@ TEST(ContactLaw, LanesOfAPackGiveTheBitsOfDoubles) {
   expect_lanes_equal_doubles<Softening>();
   expect_lanes_equal_doubles<Viscous>();
   expect_lanes_equal_doubles<GeneralLaw>();
+  expect_lanes_equal_doubles<GeneralLaw>(everything());
+  expect_lanes_equal_doubles<HertzMindlin<Coulomb, Restitution, Rolling>>(everything());
   expect_lanes_equal_doubles<Smooth>();
   expect_lanes_equal_doubles<SmoothViscous>();
 }

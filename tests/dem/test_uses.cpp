@@ -66,8 +66,10 @@ TEST(Uses, OfWallsCountOnlyWhereThereAreWalls) {
   Scene s = with({1e7, 1e7, 0, 0, 0, 0}, {1e7, 1e7, 100, 100, 0.5, 0.3});
   s.body(BodyId::floor) = {};
   const Uses u = uses_of(s);
-  EXPECT_TRUE(u.grains == LawUses{} && u.planes == LawUses{});
-  const auto all = [&] { return uses_of(s).planes == LawUses{true, true, true}; };
+  const LawUses plain{.linear = true};
+  EXPECT_TRUE(u.grains == plain && u.planes == plain);
+  const LawUses most{.friction = true, .softening = true, .damping = true, .linear = true};
+  const auto all = [&] { return uses_of(s).planes == most; };
   for (const BodyId id : planes) {
     s.body(id) = plane(2, 1);
     EXPECT_TRUE(all()) << name_of(id);

@@ -37,6 +37,17 @@ inline bool same_bits(const Row& a, const Row& b) { return std::memcmp(&a, &b, s
 
 inline dem::State random_state(RandomNumbers& number, dem::Index n) {
   dem::State s;
+  const auto spring = [&](double slipping) {
+    dem::Spring<double> all;
+    dem::for_each_named(all, all, [&](const char*, auto& value, const auto&) {
+      if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, double>)
+        value = number();
+      else
+        value = number.vector();
+    });
+    all.slipping = slipping;
+    return all;
+  };
   for (dem::Index k = 0; k < n; ++k) {
     s.id.push_back((k + n / 2) % n);
     s.r.push_back(number());
@@ -45,12 +56,10 @@ inline dem::State random_state(RandomNumbers& number, dem::Index n) {
     }
     s.part_of.push_back(static_cast<dem::BodyId>(k % 3));
     if (k > 0)
-      s.contacts.push_back(
-          {k - 1, k, {number.vector(), static_cast<double>(k % 2), number.vector(), number.vector()}});
-    s.wall_contacts.push_back(
-        {k, dem::BodyId::floor, {number.vector(), 1, number.vector(), number.vector()}});
+      s.contacts.push_back({k - 1, k, spring(k % 2)});
+    s.wall_contacts.push_back({k, dem::BodyId::floor, spring(1)});
   }
-  if (n > 0) s.wall_contacts.push_back({0, dem::BodyId::top_wall, {number.vector(), 0, {}, {}}});
+  if (n > 0) s.wall_contacts.push_back({0, dem::BodyId::top_wall, spring(0)});
   for (dem::BodyState& body : s.bodies) body = {number.vector(), number.vector(), number.vector()};
   for (double* value : {&s.ledger.slip, &s.ledger.viscous, &s.ledger.planes, &s.ledger.layers}) {
     *value = number();

@@ -33,6 +33,8 @@ Checkpoint sample(dem::Index grains) {
   c.scene.body(dem::BodyId::top_wall).z = dem::Drive::at(number());
   c.scene.body(dem::BodyId::top_layer) = dem::layer(dem::Drive::by(number()), true);
   c.scene.body(dem::BodyId::y_high) = dem::plane(1, -1, number());
+  c.histories.velocity = {History::Between::steps, true, {0, 0.25, 1}, {number(), number(), number()}};
+  c.water_settings.sides.high[2].history = {History::Between::linear, false, {0, 2}, {number(), -0.0}};
   c.state = random_state(number, grains);
   c.scene.exchange_interval = grains > 0 ? 4 : 0;
   for (dem::Index k = 0; k < grains; ++k) {
@@ -55,7 +57,7 @@ class CheckpointFile : public testing::Test {
     return message([&] { read_checkpoint(path); });
   }
   // As if the file had been written with what now stands in it.
-  void reseal(std::int64_t format = 8) const {
+  void reseal(std::int64_t format = 9) const {
     std::string bytes = contents(path);
     seal(bytes, "checkpoint", format);
     directory.write("checkpoint.h5", bytes);
@@ -90,6 +92,8 @@ TEST_F(CheckpointFile, KeepsEveryBit) {
     EXPECT_EQ(read.water.cells, written.water.cells);
     EXPECT_EQ(read.water.q, written.water.q);
     EXPECT_EQ(read.water.x_map, written.water.x_map);
+    EXPECT_EQ(read.histories, written.histories);
+    EXPECT_EQ(read.water_settings, written.water_settings);
     EXPECT_TRUE(std::signbit(read.height_0));
     EXPECT_EQ(read.start.energy, written.start.energy);
     ASSERT_EQ(read.rows.size(), written.rows.size());
@@ -215,7 +219,7 @@ TEST_F(CheckpointFile, RefusesAnotherFormat) {
   reseal(1000);
   EXPECT_EQ(
       why_not(),
-      path.string() + ": written by a later version of moraine (checkpoint format 1000; this one reads 8)");
+      path.string() + ": written by a later version of moraine (checkpoint format 1000; this one reads 9)");
 
   directory.write("checkpoint.h5", hdf5);  // has lost its seal
   EXPECT_THROW(read_checkpoint(path), Damaged);
@@ -224,13 +228,13 @@ TEST_F(CheckpointFile, RefusesAnotherFormat) {
   EXPECT_TRUE(
       contains(why_not(), path.string() + ": written by an earlier version of moraine (checkpoint format 4"))
       << why_not();
-  EXPECT_TRUE(contains(why_not(), "this one reads 8")) << why_not();
+  EXPECT_TRUE(contains(why_not(), "this one reads 9")) << why_not();
 }
 
 // A checkpoint before it is no help where this version is the wrong one.
 TEST_F(CheckpointFile, CallsOnlyDamageDamage) {
   write_checkpoint(path, sample(2));
-  reseal(9);
+  reseal(10);
   try {
     read_checkpoint(path);
     FAIL();
@@ -307,6 +311,18 @@ TEST_F(CheckpointFile, RefusesWhatIsNoScene) {
   expect_refused([](Scene& s) { s.body(BodyId::none) = dem::floor_at(0); }, "no body has the shape");
   expect_refused([](Scene& s) { s.body(BodyId::x_low).axis = 3; }, "the side wall x_low has the axis 3");
   expect_refused([](Scene& s) { s.body(BodyId::x_low).facing = 0; }, "the side wall x_low faces 0");
+}
+
+TEST_F(CheckpointFile, RefusesWhatIsNoHistory) {
+  Checkpoint c = sample(3);
+  c.histories.velocity.value.pop_back();
+  write_checkpoint(path, c);
+  EXPECT_TRUE(contains(why_not(), "the history of the velocity has 2 values at 3 times")) << why_not();
+  c = sample(3);
+  c.water_settings.sides.high[2].history.time[1] = 0;
+  write_checkpoint(path, c);
+  EXPECT_TRUE(contains(why_not(), "the history of the water has 2 values at 2 times, which do not rise"))
+      << why_not();
 }
 
 TEST_F(CheckpointFile, RefusesWhatIsNoWater) {

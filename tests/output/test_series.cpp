@@ -58,7 +58,7 @@ TEST_F(SeriesFile, KeepsEveryBit) {
   for (const int given : {0, 1, 700}) {
     std::vector<Row> rows = some_rows(given);
     {
-      Series series(path, rows, /*with_water=*/true, /*with_sides=*/true);
+      Series series(path, rows, /*with_water=*/true, /*with_sides=*/true, /*with_asked=*/true);
       expect_rows(rows);
       for (int k = 0; k < 300; ++k) {
         rows.push_back(number.row());
@@ -104,7 +104,7 @@ TEST_F(SeriesFile, CanBeReadWhileItGrows) {
     std::fputs(complaint.c_str(), stderr);
     _exit(complaint.empty() ? 0 : 1);
   }
-  Series series(path, {}, true, true);
+  Series series(path, {}, true, true, true);
   for (const Row& row : rows) {
     series.append(row);
     usleep(200);
@@ -118,7 +118,7 @@ TEST_F(SeriesFile, IsReadAndReplacedAfterAKill) {
   const std::vector<Row> rows = some_rows(5);
   const pid_t writer = fork();
   if (writer == 0) {
-    Series series(path, {}, true, true);
+    Series series(path, {}, true, true, true);
     for (const Row& row : rows) series.append(row);
     raise(SIGKILL);
   }
@@ -126,7 +126,7 @@ TEST_F(SeriesFile, IsReadAndReplacedAfterAKill) {
   expect_rows(rows);
 
   {
-    Series series(path, {rows[0], rows[1]}, true, true);
+    Series series(path, {rows[0], rows[1]}, true, true, true);
     series.append(rows[2]);
   }
   expect_rows({rows[0], rows[1], rows[2]});

@@ -28,6 +28,12 @@ inline std::vector<NamedBed> named_beds(const Bed& open, const Bed& walled, cons
                           {"sheared along side walls", sheared_between_walls(walled)},
                           {"sizes 1:20, damped, softening", sheared_graded_bed(graded)},
                           {"sizes 1:20, held height", sheared_graded_bed(graded)},
+                          {"Hertz and Mindlin", sheared_bed(open)},
+                          {"Hertz and Mindlin, restitution, rolling", sheared_bed(open)},
+                          {"rolling", sheared_bed(open)},
+                          {"restitution, cohesion, no ledger", sheared_bed(open)},
+                          {"every law, along side walls", sheared_between_walls(walled)},
+                          {"every law, sizes 1:20", sheared_graded_bed(graded)},
                           {"a velocity that changes, with a profile, on a slope", sheared_bed(open)},
                           {"stresses that change", sheared_bed(open)}};
   for (ContactParameters& p : a[1].bed.scene.contact) p.mu_d = 0.3;
@@ -42,12 +48,18 @@ inline std::vector<NamedBed> named_beds(const Bed& open, const Bed& walled, cons
   damp_grains(a[11].bed.scene, 0.2);
   for (ContactParameters& p : a[11].bed.scene.contact) p.mu_d = 0.3;
   drive_top_layer(a[12].bed.scene, Drive::at(0.2), true);
-  Scene& uneven = a[13].bed.scene;
+  use_hertz(a[13].bed.scene);
+  use_hertz(a[14].bed.scene, 0.7), resist_rolling(a[14].bed.scene);
+  resist_rolling(a[15].bed.scene);
+  a[16].bed.scene.ledger = false, cohere(a[16].bed.scene, 0.1);
+  for (ContactParameters& p : a[16].bed.scene.contact) p.zeta = 0.1;
+  use_every_law(a[17].bed.scene), use_every_law(a[18].bed.scene);
+  Scene& uneven = a[19].bed.scene;
   uneven.down = {std::sin(0.1), 0, -std::cos(0.1)};
   drive_top_layer(uneven, changing_velocity());
   damp_grains(uneven, 5);
-  a[14].bed.scene.body(BodyId::top_wall).z.rate = 2e4;
-  drive_top_layer(a[14].bed.scene, changing_stress());
+  a[20].bed.scene.body(BodyId::top_wall).z.rate = 2e4;
+  drive_top_layer(a[20].bed.scene, changing_stress());
   return a;
 }
 

@@ -32,6 +32,28 @@ struct LinearContact {
   }
 };
 
+// Elastic spheres in place of linear springs, about as stiff as 1e5 N/m under 0.2 N.
+inline void use_hertz(Scene& s, double restitution = 1) {
+  for (ContactParameters& p : s.contact) {
+    p.k_n = p.k_t = 0, p.E_star = 5e8, p.G_star = 1e8;
+    p.zeta = damping_ratio(restitution), p.density_i = p.density_j = s.density;
+  }
+}
+inline void resist_rolling(Scene& s, double mu_roll = 0.1, double mu_twist = 0) {
+  for (ContactParameters& p : s.contact) {
+    p.k_roll = 5e4, p.mu_roll = mu_roll;
+    p.k_twist = mu_twist > 0 ? 3e4 : 0, p.mu_twist = mu_twist;
+  }
+}
+inline void cohere(Scene& s, double cohesion) {  // N
+  for (ContactParameters& p : s.contact) p.cohesion = cohesion;
+}
+// Hertz and Mindlin with all parts there are.
+inline void use_every_law(Scene& s) {
+  use_hertz(s, 0.8), resist_rolling(s, 0.1, 0.05), cohere(s, 0.02);
+  for (ContactParameters& p : s.contact) p.mu_d = 0.8 * p.mu_s, p.gamma_t = 2;
+}
+
 inline Body wall_at_rest() {
   Body b = top_wall();
   b.z = Drive::at(0);

@@ -40,6 +40,19 @@ std::vector<Variant> variants() {
   all.push_back({"sizes 1:20, damped", sheared_graded_bed(), 10});
   all.back().bed.scene.with(Material::grain).gamma_n = all.back().bed.scene.with(Material::grain).gamma_t =
       0.2;
+  const auto add = [&](const char* name, auto&& change, int longer = 1) {
+    all.push_back({name, sheared_bed(), longer});
+    change(all.back().bed.scene);
+  };
+  add("Hertz and Mindlin", [](Scene& s) { use_hertz(s); });
+  add("Hertz and Mindlin, restitution", [](Scene& s) { use_hertz(s, 0.5); });
+  add("restitution", [](Scene& s) {
+    for (ContactParameters& p : s.contact) p.zeta = damping_ratio(0.5);
+  });
+  add("rolling", [](Scene& s) { resist_rolling(s); });
+  add("rolling and twisting", [](Scene& s) { resist_rolling(s, 0.2, 0.1); });
+  add("cohesion", [](Scene& s) { cohere(s, 0.05); });
+  add("every law", [](Scene& s) { use_every_law(s); });
   all.push_back({"a velocity that changes, with a profile", sheared_bed()});
   drive_top_layer(all.back().bed.scene, changing_velocity());
   all.push_back({"stresses that change, on a slope", sheared_bed()});

@@ -49,6 +49,19 @@ TEST_F(Errors, NegativeRadius) {
                   {"bad/case.toml:7", "grains.radius_mean = -0.02", "expected > 0 m"});
 }
 
+// Where the height of the bed decides how long the stage lasts, too, before anything runs.
+TEST_F(Errors, ALoadThatEndsBeforeItsStage) {
+  const fs::path small = make("small", small_case());
+  const std::string ends = "={ times = [0, 0.01], values = [1000, 2000] }";
+  expect_error(
+      to_run(small, {"stage.shear.normal_stress" + ends}),
+      {"stage.shear.normal_stress", "ends at 0.01 s and the stage at 0.2 s", "expected values up to there"});
+  expect_error(to_run(small, {"stage.shear.normal_stress" + ends, "stage.shear.strain_rate=0",
+                              "stage.shear.velocity=0.1"}),
+               {"stage shear: lasts", "longer than one of its loads"});
+  EXPECT_FALSE(fs::exists(small / "output"));
+}
+
 TEST_F(Errors, NoToml) { expect_error_in("[grains]", "[grains", {"bad/case.toml:2"}); }
 
 TEST_F(Errors, NoCase) {

@@ -3,9 +3,10 @@
 #include <functional>
 
 #include "backends.hpp"
+#include "physics/same_bits.hpp"
 #include "physics/scenes.hpp"
 #include "program.hpp"
-#include "run/histories.hpp"
+#include "run/stages.hpp"
 
 namespace moraine {
 namespace {
@@ -170,6 +171,41 @@ TEST_F(LoadTables, AreReadBackFromTheSeries) {
     EXPECT_NEAR(again[k].asked_normal_stress, rows[k].asked_normal_stress, 1e-9);
     EXPECT_NEAR(again[k].asked_velocity, rows[k].asked_velocity, 1e-13);
   }
+}
+
+// Pieces reach every engine at the same steps, and wherever one stops.
+TEST_F(LoadTables, SameBitsOnAnyThreadsAndBackend) {
+  const auto pulses = [&](const std::string& name) {
+    return loaded(name, "time, value\n0, 2000\n0.033, 1000\n0.07, 3000\n0.1, 2500\n",
+                  "time, value\n0, 0.1\n0.02, -0.2\n0.05, 0.3\n0.1, 0\n");
+  };
+  const std::vector<std::string> uneven{"stage.pulses.profile=cosine", "stage.pulses.velocity_amplitude=0.05",
+                                        "stage.pulses.velocity_frequency=50"};
+  const fs::path one = pulses("one"), other = pulses("other");
+  ASSERT_NO_FATAL_FAILURE(run(one, uneven, {"--threads", "1"}));
+  ASSERT_NO_FATAL_FAILURE(run(other, uneven, {"--threads", "2"}));
+  expect_same_results(one, other);
+
+  std::vector<cases::Override> overrides{{"start", "."}, {"stages", "[\"pulses\"]"}};
+  for (const std::string& set : uneven) {
+    const auto equals = set.find('=');
+    overrides.push_back({set.substr(0, equals), set.substr(equals + 1)});
+  }
+  overrides.push_back({"stage.pulses.zero_kinematics", "true"});
+  const cases::Case c = cases::load(one, overrides);
+  const run::Start start = run::start_of(c);
+  const auto after = [&](dem::Backend backend, std::int64_t at_once) {
+    output::Checkpoint now = start.before;
+    run::Stage stage = run::prepare(c, 0, start, now);
+    const auto engine = dem::make_engine(backend, 1);
+    engine->load(stage.scene, now.state);
+    for (std::int64_t step = 0; step < 600; step += at_once)
+      run::advance(*engine, stage.scene, stage.histories, step, step + at_once);
+    return engine->state();
+  };
+  const dem::State by_pairs = after(dem::Backend::cpu, 600);
+  dem::expect_same_bits(after(dem::Backend::cpu, 1), by_pairs);
+  dem::expect_same_bits(after(dem::Backend::reference, 100), by_pairs);
 }
 
 // A run that goes on refuses a table that is another by now; it knows the resolved case, which says the same.

@@ -69,9 +69,25 @@ inline void scatter(const Offset* at_i, const Offset* at_target, const Geometry<
     return reinterpret_cast<double*>(reinterpret_cast<char*>(first) + o);
   };
   constexpr bool to_slots = shares == Shares::to_slots;
-  const P columns[8] = {a.f.x, a.f.y, a.f.z, a.slip, a.f_x_n.x, a.f_x_n.y, a.f_x_n.z, a.viscous};
   typename Lines<P>::Line action[P::width];
-  to_lines(columns, action);
+  const auto make_lines = [&](const Vec3<P>& moment) {
+    const P columns[8] = {a.f.x, a.f.y, a.f.z, a.slip, moment.x, moment.y, moment.z, a.viscous};
+    to_lines(columns, action);
+  };
+  if constexpr (L::couples) {  // each grain's torque is its own
+    typename Lines<P>::Line on_i[P::width];
+    make_lines(a.torque_on_i(at));
+    std::copy(action, action + P::width, on_i);
+    make_lines(a.torque_on_j(at));
+    const auto part_i = Lines<P>::on_i(1), part_j = Lines<P>::on_j(1);
+    for (int k = 0; k < P::width; ++k) {
+      double *const i = row_at(load, at_i[k]), *const j = row_at(to_slots ? slot : load, at_target[k]);
+      fma(part_i, on_i[k], Lines<P>::load(i)).store(i);
+      (to_slots ? part_j * action[k] : fma(part_j, action[k], Lines<P>::load(j))).store(j);
+    }
+    return;
+  }
+  make_lines(a.f_x_n);
   alignas(64) double l_i[P::width] = {}, l_j[P::width] = {};
   if constexpr (L::rubs) at.l_i.store(l_i), at.l_j.store(l_j);
   for (int k = 0; k < P::width; ++k) {
@@ -125,6 +141,7 @@ template <class L, Account account, Shares shares, Lists lists, class P>
   Gathered<P> motion[packs];
   Geometry<P> geometry[packs];
   Slide<P> slides[packs];
+  Patch<L, P> patches[packs];
   Vec3<P> delta_t[packs], v[packs];
   Grip<P> grips[packs];
   const auto v_c = [&](int q) -> const Vec3<P>& {
@@ -157,15 +174,18 @@ template <class L, Account account, Shares shares, Lists lists, class P>
       for (int k = 0; k < P::width; ++k)
         __builtin_prefetch(&rows.grain(at_j[k]).x), __builtin_prefetch(&rows.grain(at_j[k]).omega);
       const Spring<P> spring = recalled<L, account, P>(list, place(q));
-      if constexpr (L::rubs) delta_t[q] = carry(dt, geometry[q], slides[q], spring.delta_t);
+      patches[q] = patch<L>(law, geometry[q]);
+      if constexpr (L::rubs)
+        delta_t[q] = trial_spring<L>(law, dt, geometry[q], patches[q], slides[q], spring);
       v[q] = velocity_at_step<L>(dt, v_c(q), spring);
-      grips[q] = grip<L>(law, geometry[q], v[q], delta_t[q], spring);
+      grips[q] = grip<L>(law, geometry[q], patches[q], v[q], delta_t[q], spring);
     }
     for (int q = 0; q < block; ++q) {
       const PairGroup& p = group(q);
       const Geometry<P>& at = geometry[q];
       Spring<P> spring = recalled<L, account, P>(list, place(q));
-      const Action<P> a = act<L, account>(law, dt, at, v_c(q), v[q], delta_t[q], grips[q], spring);
+      const Action<P> a = act<L, account>(law, dt, at, patches[q], Moved<P>{motion[q].before, slides[q]},
+                                          v_c(q), v[q], delta_t[q], grips[q], spring);
       remember<L, account>(spring, list, place(q));
       scatter<L, shares>(&p.i[lane(q)], &p.target[lane(q)], at, a, load, slot);
     }

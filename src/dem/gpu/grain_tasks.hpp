@@ -99,6 +99,10 @@ struct GrainTasks {
     const Geometry<double> g = between_grains(nearest_image(w.sides, a.x - b.x), a.r + b.r, a.r - b.r);
     const Action<double> action = contact_law<Grains, account>(w.scene.with(Material::grain), w.scene.dt, g,
                                                                {a.v - b.v, a.omega, b.omega}, spring);
+    if constexpr (Grains::couples) {
+      if (first) return {action.f, action.slip, action.torque_on_i(g), 1, action.viscous};
+      return {-action.f, 0, action.torque_on_j(g), 1, 0};
+    }
     if (first) return {action.f, action.slip, action.f_x_n, g.l_i, action.viscous};
     // The share of a pair of an earlier chunk comes by way of a slot on the CPU, where its torque is rounded
     // by itself.

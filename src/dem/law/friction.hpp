@@ -30,16 +30,17 @@ struct Coulomb {
     Vec3<T> delta_t{};  // m, tangential spring of i against j
     static constexpr auto list() { return std::tuple{Named{"delta_t", &Memory::delta_t}}; }
   };
-  static bool keeps(const Parameters& p) { return p.k_t > 0 && p.mu_s > 0; }
+  template <class P>
+  static bool keeps(const P& p) {
+    return (p.k_t > 0 || p.G_star > 0) && p.mu_s > 0;
+  }
 
   // Coulomb's limit, N.
   template <class T, class Spring>
   MORAINE_HD static T limit(const Parameters& p, const T& f_n, const Spring&) {
     return T(p.mu_s) * f_n;
   }
-  static double stored(const Parameters& p, const Vec3d& delta_t) {
-    return 0.5 * p.k_t * dot(delta_t, delta_t);
-  }  // J
+  static double stored(double k_t, const Vec3d& delta_t) { return 0.5 * k_t * dot(delta_t, delta_t); }  // J
 };
 
 struct SofteningCoulomb : Coulomb {

@@ -19,6 +19,34 @@ struct Motion {
   Vec3<T> omega_i, omega_j;  // rad/s
 };
 
+// Both radii, m; that of j at a grain only.
+template <class T>
+MORAINE_HD T radius_i(const Geometry<T>& g) {
+  return fma(T(-0.5), g.delta_n, g.l_i);
+}
+template <class T>
+MORAINE_HD T radius_j(const Geometry<T>& g) {
+  return fma(T(-0.5), g.delta_n, g.l_j);
+}
+// Whether j is a grain, not a plane.
+template <class T>
+MORAINE_HD auto at_grain(const Geometry<T>& g) {
+  return g.curvature > T(0);
+}
+
+// R of laws that have it, m: 1/R = 1/r_i + 1/r_j, of a plane 1/r_i.
+template <class T>
+struct Radius {
+  T radius;
+};
+template <class T>
+struct NoRadius {};
+template <class T>
+MORAINE_HD Radius<T> reduced_radius(const Geometry<T>& g) {
+  const T r_i = radius_i(g), r_j = radius_j(g);
+  return {select(at_grain(g), r_i * r_j / (r_i + r_j), r_i)};
+}
+
 template <class T>
 MORAINE_HD Geometry<T> between_grains(const Vec3<T>& x_ij, const T& r_sum, const T& r_difference) {
   const T distance = sqrt(dot(x_ij, x_ij));

@@ -8,11 +8,11 @@
 namespace moraine::dem {
 
 struct Undamped {
-  static constexpr bool damps = false;
+  static constexpr bool damps = false, restitutes = false;
 };
 
 struct Viscosity {
-  static constexpr bool damps = true;
+  static constexpr bool damps = true, restitutes = false;
 
   struct Parameters {
     double gamma_n = 0;  // N s/m
@@ -23,7 +23,10 @@ struct Viscosity {
     }
   };
   MORAINE_HD static bool used(const Parameters& p) { return p.gamma_n > 0 || p.gamma_t > 0; }
-  static bool keeps(const Parameters& p) { return used(p); }
+  template <class P>
+  static bool keeps(const P& p) {  // zeta: restitution.hpp
+    return used(p) || p.zeta > 0;
+  }
 
   template <class T>
   struct Memory {
@@ -38,10 +41,15 @@ struct Viscosity {
     return select(touched, axpy(T(0.5), v_c - v, v_c), v_c);
   }
 
+  // N s/m, on a normal force of law N.
+  template <class N, class P, class T>
+  MORAINE_HD static T gamma_n(const P& p, const Geometry<T>&, const typename N::template At<T>&) {
+    return T(p.gamma_n);
+  }
   // N, on top of an elastic normal force.
   template <class T>
-  MORAINE_HD static T normal(const Parameters& p, const Geometry<T>& g, const Vec3<T>& v, const T& elastic) {
-    return max(fma(T(-p.gamma_n), dot(v, g.n), elastic), T(0));
+  MORAINE_HD static T normal(const T& gamma_n, const Geometry<T>& g, const Vec3<T>& v, const T& elastic) {
+    return max(fma(-gamma_n, dot(v, g.n), elastic), T(0));
   }
   // N, on top of an elastic tangential force, before Coulomb's limit.
   template <class T>
@@ -59,7 +67,10 @@ struct ViscousWork {
     Vec3<T> f_viscous{};  // N, the part of the force at n that damping contributes
     static constexpr auto list() { return std::tuple{Named{"f_viscous", &Memory::f_viscous}}; }
   };
-  static bool keeps(const Viscosity::Parameters& p) { return Viscosity::used(p); }
+  template <class P>
+  static bool keeps(const P& p) {
+    return Viscosity::keeps(p);
+  }
 };
 
 }  // namespace moraine::dem
