@@ -60,6 +60,16 @@ struct Scene {
   MORAINE_HD bool is_rigid(BodyId part_of) const {
     return part_of != BodyId::none && body(part_of).is_held(2);
   }
+  // Whether a layer's grains move past each other, as its velocity varies across y. They are no grains then
+  // but the roughness of what slides over the bed, and do not touch: what is imposed would press them deep
+  // into each other.
+  MORAINE_HD bool slides_in_itself(BodyId part_of) const {
+    return part_of != BodyId::none && body(part_of).x.profile != Profile::uniform;
+  }
+  // Whether grains that are part of these are left out as a pair.
+  MORAINE_HD bool never_touch(BodyId a, BodyId b) const {
+    return (is_rigid(a) && is_rigid(b)) || (a == b && slides_in_itself(a));
+  }
 
   // kg; more than the weight tells, by density scaling. The second of a grain of this volume, m3.
   MORAINE_HD double inertial_mass(double r, Material m) const;

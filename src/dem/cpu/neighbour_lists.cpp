@@ -47,14 +47,14 @@ void for_each_chunk(const Host& space, Bed& bed, Work&& work) {
 // Pairs that the grains of one chunk find, each pair once by one of its grains; the other may be of an
 // earlier chunk, whose pair it then is.
 void find_pairs(const Bed& bed, Chunk& chunk, const CloseGrains& grains) {
-  const auto is_rigid = [&](Index i) { return bed.scene.is_rigid(bed.part_of.data()[i]); };
+  const BodyId* const part_of = bed.part_of.data();
   for (auto& [of, pairs] : chunk.found) pairs.clear();
   std::vector<GrainPair>& own = chunk.found[chunk.number];
   for (Index a = chunk.begin; a < chunk.end; ++a) {
-    const bool rigid = is_rigid(a);
+    const bool free = part_of[a] == BodyId::none;
     grains.after(grains.place(a), bed.margin, [&](Index k, double, double) {
       const Index b = grains.grain(k);
-      if (rigid && is_rigid(b)) return;
+      if (!free && bed.scene.never_touch(part_of[a], part_of[b])) return;
       const GrainPair pair{std::min(a, b), std::max(a, b)};
       (pair.i >= chunk.begin ? own : chunk.found[bed.order.chunk_of(pair.i)]).push_back(pair);
     });
