@@ -81,8 +81,8 @@ def tile(source, target, copies, grains=None):
 
 
 class Beds:
-    def __init__(self, program, folder=root / "build/bench-beds"):
-        self.program = Path(program).resolve()
+    def __init__(self, program, folder=root / "build/bench-beds", backend="cpu"):
+        self.program, self.backend = Path(program).resolve(), backend
         self.folder = folder / hashlib.sha256(self.program.read_bytes()).hexdigest()[:12]
         self.folder.mkdir(parents=True, exist_ok=True)
 
@@ -107,7 +107,7 @@ class Beds:
         return self._once(name, make)
 
     def _run(self, case):
-        call(self.program, "run", case, "--quiet", "--force", "--backend", "cpu")
+        call(self.program, "run", case, "--quiet", "--force", "--backend", self.backend)
 
     def _case(self, name, text, run=False):
         def make(part):

@@ -208,7 +208,8 @@ struct Neighbours {
     space.for_each(n, rows);
     space.exclusive_scan(count_.data(), row.data(), n + 1);
     total = space.read(row.data() + n);
-    neighbour.resize(std::max<std::int64_t>(total, 1));
+    neighbour.resize(total);
+    if (total == 0) return neighbour.set(std::vector<Index>(1));  // never read, but copied
     rows.row = row.data(), rows.neighbour = neighbour.data();
     space.for_each(n, rows);
   }

@@ -83,7 +83,7 @@ struct Drive {
  private:
   MORAINE_HD double at_time(double value, double t) const {
     if (rate != 0) value = fma(rate, t - since, value);
-    return value + (amplitude != 0 ? amplitude * ::sin(2 * std::numbers::pi * frequency * t + phase) : 0);
+    return value + (amplitude != 0 ? amplitude * sine(2 * std::numbers::pi * frequency * t + phase) : 0);
   }
 };
 

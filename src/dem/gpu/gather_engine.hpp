@@ -21,8 +21,8 @@ namespace moraine::dem::gpu {
 struct CarrySprings {
   const std::int64_t *old_row, *row;
   const Index *old_neighbour, *neighbour;
-  const Spring<double>* old_spring;
-  Spring<double>* spring;
+  const SpringRow* old_spring;
+  SpringRow* spring;
   MORAINE_HD void operator()(std::int64_t i) const {
     for (std::int64_t k = row[i]; k < row[i + 1]; ++k) {
       spring[k] = {};
@@ -130,7 +130,7 @@ class GatherEngine final : public Engine {
 
     const std::vector<std::int64_t> row = lists_.row.get();
     const std::vector<Index> neighbour = lists_.neighbour.get();
-    const std::vector<Spring<double>> spring = spring_.get(), plane_spring = plane_spring_.get();
+    const std::vector<SpringRow> spring = spring_.get(), plane_spring = plane_spring_.get();
     for (Index i = 0; i < n_; ++i) {
       for (std::int64_t k = row[i]; k < row[i + 1]; ++k)
         if (const Index j = neighbour[k]; j > i)
@@ -164,11 +164,11 @@ class GatherEngine final : public Engine {
       for (std::size_t i = 0; i < water.size(); ++i) water[i] = {s.water_force[i], 0};
     water_.set(water);
     const auto planes = static_cast<std::size_t>(bodies.planes);
-    std::vector<Spring<double>> springs(std::max<std::size_t>(planes * n_, 1));
+    std::vector<SpringRow> springs(std::max<std::size_t>(planes * n_, 1));
     for (const WallContact& w : s.wall_contacts)
       if (const Plane* plane = bodies.find(w.wall))
-        springs[planes * w.i + (plane - bodies.plane)] =
-            remembered(view_.scene, view_.scene.between(s.material_of(w.i), plane->material), w.spring);
+        springs[planes * w.i + (plane - bodies.plane)] = {
+            remembered(view_.scene, view_.scene.between(s.material_of(w.i), plane->material), w.spring)};
     plane_spring_.set(springs);
     lost_.resize(view_.chunks());
   }
@@ -194,7 +194,8 @@ class GatherEngine final : public Engine {
     std::swap(lists_, old_lists_);
     std::swap(spring_, old_spring_);
     search(step);
-    spring_.resize(std::max<std::int64_t>(lists_.total, 1));
+    spring_.resize(lists_.total);
+    if (lists_.total == 0) spring_.set(std::vector<SpringRow>(1));  // never read, but copied
     space_.for_each(n_, CarrySprings{old_lists_.row.data(), lists_.row.data(), old_lists_.neighbour.data(),
                                      lists_.neighbour.data(), old_spring_.data(), spring_.data()});
     refresh_view();
@@ -203,11 +204,11 @@ class GatherEngine final : public Engine {
   void place_springs(const State& s) {
     const std::vector<std::int64_t> row = lists_.row.get();
     const std::vector<Index> neighbour = lists_.neighbour.get();
-    std::vector<Spring<double>> springs(std::max<std::int64_t>(lists_.total, 1));
+    std::vector<SpringRow> springs(std::max<std::int64_t>(lists_.total, 1));
     for (const Contact& c : s.contacts)
       for (const auto& [i, j] : {std::pair{c.i, c.j}, std::pair{c.j, c.i}})
         for (std::int64_t k = row[i]; k < row[i + 1]; ++k)
-          if (neighbour[k] == j) springs[k] = remembered(view_.scene, between(s, c), c.spring);
+          if (neighbour[k] == j) springs[k] = {remembered(view_.scene, between(s, c), c.spring)};
     spring_.set(springs);
   }
 
@@ -299,7 +300,7 @@ class GatherEngine final : public Engine {
   Array<WaterRow> water_;
   Array<BodyId> part_of_;
   Array<Material> material_;
-  Array<Spring<double>> spring_, old_spring_, plane_spring_;
+  Array<SpringRow> spring_, old_spring_, plane_spring_;
   Array<Tally> tally_[2], chunk_tally_[2];
   Array<Control> control_;
   Array<Index> lost_;

@@ -6,6 +6,9 @@
 
 namespace moraine::dem::gpu {
 
+// Aligned for loads of 16 bytes.
+struct alignas(16) SpringRow : Spring<double> {};
+
 struct GatherView {
   Scene scene;
   Sides sides;
@@ -19,9 +22,9 @@ struct GatherView {
   const BodyId* part_of;
   const std::int64_t* row;
   const Index* neighbour;
-  Spring<double>*spring, *plane_spring;  // the latter by grain, then plane
-  Tally* tally[2];                       // by group
-  Tally* chunk_tally[2];                 // where blocks have whole chunks
+  SpringRow *spring, *plane_spring;  // the latter by grain, then plane
+  Tally* tally[2];                   // by group
+  Tally* chunk_tally[2];             // where blocks have whole chunks
   Control* control;
 
   MORAINE_HD Material material(Index i) const { return order.material ? order.material[i] : Material::grain; }
