@@ -67,7 +67,7 @@ struct OnRigid {
               .spin = spin};
     scene = empty_space(0);
     scene.box = 40.0 * Vec3d{r + r_j, r + r_j, r + r_j};
-    scene.density = stuff.density;
+    scene.density.fill(stuff.density);
     scene.contact.fill(p);
     scene.dt = impact.duration() / steps_a_contact;
     if (r_j > 0)
@@ -105,7 +105,7 @@ TEST_P(ChungOoi, Test1ElasticNormalImpactOfTwoSpheres) {
   for (const Stuff& stuff : {glass, limestone}) {
     const double r = 0.010, v = 10;
     Scene s = empty_space(0);
-    s.density = stuff.density;
+    s.density.fill(stuff.density);
     s.contact.fill(law(stuff, stuff, 0.35, 1));
     const double m = mass(s, r);
     const Impact reduced{
@@ -262,7 +262,7 @@ TEST_P(ChungOoi, Test7LikeSpheresWithOppositeSpins) {
     for (const double spin : {0.175, 2.0, 22.9}) {
       const double r = 0.1, v = 0.2, e = 0.5;
       Scene s = empty_space(0);
-      s.density = stuff.density;
+      s.density.fill(stuff.density);
       s.contact.fill(law(stuff, stuff, 0.4, e));
       const Impact reduced{.r = 0.5 * r,
                            .mass = 0.5 * mass(s, r),

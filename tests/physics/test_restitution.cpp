@@ -18,7 +18,7 @@ class RestitutionAskedFor : public OnEveryBackend {
     ContactParameters p;
     p.k_n = hertz ? 0 : 1e5, p.k_t = 0, p.mu_s = p.mu_d = 0;
     if (hertz) p.E_star = young_star(7e8, 0.25, 7e8, 0.25), p.G_star = shear_star(7e8, 0.25, 7e8, 0.25);
-    p.zeta = damping_ratio(e), p.density_i = p.density_j = s.density;
+    p.zeta = damping_ratio(e), p.density_i = p.density_j = s.density[0];
     s.contact.fill(p);
     const double m1 = mass(s, r1), m = r2 > 0 ? m1 * mass(s, r2) / (m1 + mass(s, r2)) : m1;
     const double radius = r2 > 0 ? r1 * r2 / (r1 + r2) : r1;
