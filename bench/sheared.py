@@ -81,8 +81,8 @@ def tile(source, target, copies, grains=None):
 
 
 class Beds:
-    def __init__(self, program, folder=root / "build/bench-beds"):
-        self.program = Path(program).resolve()
+    def __init__(self, program, folder=root / "build/bench-beds", backend="cpu"):
+        self.program, self.backend = Path(program).resolve(), backend
         self.folder = folder / hashlib.sha256(self.program.read_bytes()).hexdigest()[:12]
         self.folder.mkdir(parents=True, exist_ok=True)
 
@@ -107,7 +107,7 @@ class Beds:
         return self._once(name, make)
 
     def _run(self, case):
-        call(self.program, "run", case, "--quiet", "--force", "--backend", "cpu")
+        call(self.program, "run", case, "--quiet", "--force", "--backend", self.backend)
 
     def _case(self, name, text, run=False):
         def make(part):
@@ -163,6 +163,39 @@ strain = 0
 duration = 0.4
 zero_kinematics = false
 """, run=True)
+
+    def under(self, name, keys):
+        """As `sheared`, but the bed has gone on undamped with these lines in its [contact]."""
+        self.sheared()
+        return self.going_on(f"under-{name}", self.folder / "sheared-1x1", keys, run=True)
+
+    def going_on(self, name, bed, keys, wall_keys=(), run=False):
+        """A case that goes on shearing where that of `bed` ended, undamped, with these lines in [contact] and [wall].
+
+        Walls are smooth: they touch grains of the layers only.
+        """
+        lines, at_walls = "\n".join(keys), "\n".join(wall_keys)
+        return self._case(f"{name}-1x1", f"""\
+extends = "../{bed.name}"
+start = "../{bed.name}"
+stages = ["shear"]
+[contact]
+gamma_n = 0
+{lines}
+[wall]
+{at_walls}
+[output]
+series_interval = {settling}
+snapshot_interval = {settling}
+[[stage]]
+name = "shear"
+strain = 0
+duration = {settling if run else 1}
+zero_kinematics = false
+wall_mu = 0
+wall_gamma_n = 0
+wall_gamma_t = 0
+""", run=run)
 
     def case(self, scene, grains=grains_of_bed):
         copies = copies_for(grains)

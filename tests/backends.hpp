@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "dem/engine.hpp"
 
@@ -17,6 +18,17 @@ struct BackendChoice {
 };
 
 inline void PrintTo(const BackendChoice& choice, std::ostream* out) { *out << choice.name; }
+
+// Where the GPU's loop can run: on the host, and on a GPU if there is one.
+inline std::vector<dem::Backend> gpu_loops() {
+  if (dem::cuda_device_present()) return {dem::Backend::reference, dem::Backend::cuda};
+  return {dem::Backend::reference};
+}
+inline std::vector<dem::Backend> both_engines() {
+  std::vector<dem::Backend> all = gpu_loops();
+  all.insert(all.begin(), dem::Backend::cpu);
+  return all;
+}
 
 class OnEveryBackend : public testing::TestWithParam<BackendChoice> {
  protected:

@@ -32,6 +32,20 @@ MORAINE_HD double min(double a, double b) { return a < b ? a : b; }
 MORAINE_HD double max(double a, double b) { return a > b ? a : b; }
 MORAINE_HD double select(bool mask, double a, double b) { return mask ? a : b; }
 
+// The sine to some 1e-16, the same bits on every processor, which libraries do not promise.
+MORAINE_HD double sine(double x) {
+  // x = k pi/2 + r. pi/2 in three parts, of which the first two have 33 bits: k times them is exact.
+  const double k = ::floor(x * 0x1.45f306dc9c883p-1 + 0.5);
+  const double r = x - k * 0x1.921fb54400000p+0 - k * 0x1.0b4611a600000p-34 - k * 0x1.3198a2e037073p-69;
+  const double r2 = r * r;
+  const double quarter = k - 4 * ::floor(0.25 * k);
+  const bool by_cosine = quarter == 1 || quarter == 3;
+  double sum = 0;  // of the series behind its first term
+  for (int n = by_cosine ? 18 : 19; n > 1; n -= 2) sum = fma(-r2 / (n * (n - 1)), sum, -r2 / (n * (n - 1)));
+  const double value = by_cosine ? 1 + sum : fma(r, sum, r);
+  return quarter < 2 ? value : -value;
+}
+
 #ifndef __CUDACC__
 
 struct Pack {

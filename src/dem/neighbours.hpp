@@ -186,8 +186,9 @@ struct Neighbours {
   std::int64_t total = 0;
 
   // Throws Error if a coordinate is not finite.
+  // material: of each grain; null where all are of the first.
   void build(const Space& space, const Scene& scene, const GrainRow* grains, const BodyId* part_of, Index n,
-             double margin) {
+             double margin, const Material* material = nullptr) {
     const Cells cells = sort_into_cells(space, scene, grains, n, margin);
     count_.resize(n + 1), row.resize(n + 1);
     search::Rows rows{.levels = cells.levels,
@@ -197,7 +198,7 @@ struct Neighbours {
                       .first = cells.first,
                       .end = cells.end,
                       .margin = margin,
-                      .sum_order = {chunk_size(n)},
+                      .sum_order = {chunk_size(n), material},
                       .count = count_.data()};
     for (int id = 0; id < body_ids; ++id) {
       rows.rigid[id] = scene.is_rigid(static_cast<BodyId>(id));
@@ -207,7 +208,8 @@ struct Neighbours {
     space.for_each(n, rows);
     space.exclusive_scan(count_.data(), row.data(), n + 1);
     total = space.read(row.data() + n);
-    neighbour.resize(std::max<std::int64_t>(total, 1));
+    neighbour.resize(total);
+    if (total == 0) return neighbour.set(std::vector<Index>(1));  // never read, but copied
     rows.row = row.data(), rows.neighbour = neighbour.data();
     space.for_each(n, rows);
   }

@@ -1,6 +1,7 @@
 // The same bits for any number of threads, on the GPU's loop, and after a restart.
 #include <cstring>
 
+#include "backends.hpp"
 #include "wet_scenes.hpp"
 
 namespace moraine::coupling {
@@ -60,7 +61,8 @@ TEST(SameBitsInWater, ForAnyThreadsAndOnTheGpusLoop) {
     EXPECT_GT(one.water.exchanges, 100);
     expect_same(one, after(WetRun(bed, w, {}, dem::Backend::cpu, 2), steps));
     expect_same(one, after(WetRun(bed, w, {}, dem::Backend::cpu, many), steps));
-    expect_same(one, after(WetRun(bed, w, {}, dem::Backend::reference, 2), steps));
+    for (const dem::Backend backend : gpu_loops())
+      expect_same(one, after(WetRun(bed, w, {}, backend, 2), steps));
   }
 }
 
@@ -70,8 +72,9 @@ TEST(SameBitsInWater, StepByStep) {
     Water w = water_over(bed);
     w.interval = m, w.k_c = 1e-11, w.compressibility = 1e-7;
     const End whole = after(WetRun(bed, w), 600);
-    for (const auto& [backend, threads] :
-         {std::pair{dem::Backend::cpu, 1}, {dem::Backend::cpu, 2}, {dem::Backend::reference, 1}}) {
+    std::vector<std::pair<dem::Backend, int>> engines{{dem::Backend::cpu, 2}};
+    for (const dem::Backend backend : both_engines()) engines.emplace_back(backend, 1);
+    for (const auto& [backend, threads] : engines) {
       WetRun run(bed, w, {}, backend, threads);
       for (int k = 0; k < 600; ++k) run.engine->advance(1), (void)run.engine->state();
       expect_same(whole, {run.engine->state(), run.water->state()});

@@ -1,4 +1,5 @@
 // Grains larger than cells: porosity against points, flow against bounds, and what the coupling keeps.
+#include "backends.hpp"
 #include "coupling/mapping.hpp"
 #include "dem/state_rows.hpp"
 #include "strewn.hpp"
@@ -227,7 +228,7 @@ TEST(WideGrains, GiveTheSameBitsForAnyThreadsAndAfterARestart) {
     };
     const std::vector<double> one = after(dem::Backend::cpu, 1);
     EXPECT_EQ(one, after(dem::Backend::cpu, 4));
-    EXPECT_EQ(one, after(dem::Backend::reference, 2));
+    for (const dem::Backend backend : gpu_loops()) EXPECT_EQ(one, after(backend, 2));
     for (const int at : {200, 700}) {
       WetRun first(bed, w);
       first.advance(at);

@@ -96,7 +96,7 @@ struct Failing : FluidCoupling {
 TEST(SurroundingsThatFail, EndARunByTheirError) {
   Bed bed = cloud(Failing::grains, 0.26, 3);
   bed.scene.exchange_interval = 1;
-  for (const Backend backend : {Backend::cpu, Backend::reference})
+  for (const Backend backend : both_engines())
     for (const int threads : {1, 2, 4})
       for (const bool in_remap : {false, true})
         for (const int at : {1, 2, 7, 40}) {

@@ -8,6 +8,7 @@
 #include <map>
 #include <sstream>
 
+#include "backends.hpp"
 #include "case/case.hpp"
 #include "coupling/pore_water.hpp"
 #include "program.hpp"
@@ -200,12 +201,14 @@ TEST_P(ReferenceBits, AreTheSame) {
       expect_again("margin " + margin,
                    computed(options("margin " + margin, 1, "neighbour_margin=" + margin)));
   if (scene.again & reference)
-    for (const int n : {1, 3}) {
-      if (n > 1 && !on_threads) continue;
-      run::Options with = options("reference, threads " + std::to_string(n), n);
-      with.backend = dem::Backend::reference;
-      expect_again(with.directory.filename(), computed(with));
-    }
+    for (const dem::Backend backend : gpu_loops())
+      for (const int n : {1, 3}) {
+        if (n > 1 && (!on_threads || backend == dem::Backend::cuda)) continue;
+        const std::string loop = backend == dem::Backend::cuda ? "cuda" : "reference";
+        run::Options with = options(loop + ", threads " + std::to_string(n), n);
+        with.backend = backend;
+        expect_again(with.directory.filename(), computed(with));
+      }
 }
 
 INSTANTIATE_TEST_SUITE_P(EveryScene, ReferenceBits, testing::ValuesIn(reference_scenes()),

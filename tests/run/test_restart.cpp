@@ -3,6 +3,7 @@
 #include <random>
 #include <thread>
 
+#include "backends.hpp"
 #include "case/case.hpp"
 #include "dem/engine.hpp"
 #include "program.hpp"
@@ -115,7 +116,7 @@ TEST_F(Program, AnyStepMayBeTheFirstAfterARestart) {
     const fs::path small = make("small", text);
     const cases::Case c = cases::load(small);
     const run::Start start = run::start_of(c);
-    for (const dem::Backend backend : {dem::Backend::cpu, dem::Backend::reference}) {
+    for (const dem::Backend backend : both_engines()) {
       output::Checkpoint now = start.before;
       const run::Stage stage = run::prepare(c, 0, start, now);
       const auto engine = dem::make_engine(backend, 1), other = dem::make_engine(backend, 1);

@@ -22,10 +22,14 @@ struct GrainTasks {
   template <class Item>
   MORAINE_TEAM void pair_forces(const Item& item, Index i, LoadRow& load) const {
     const std::int64_t end = w.row[i + 1];
-    for (std::int64_t k_0 = w.row[i]; item.any(k_0 < end); k_0 += Item::lanes) {
-      const std::int64_t k = k_0 + item.lane;
+    std::int64_t k = w.row[i] + item.lane;
+    // The next neighbour is asked for before this one's contact is worked out: memory is far away.
+    Index j = k < end ? w.neighbour[k] : i;
+    for (; item.any(k - item.lane < end); k += Item::lanes) {
+      const Index next = k + Item::lanes < end ? w.neighbour[k + Item::lanes] : i;
       Share share{};
-      if (k < end) share = contact(i, w.neighbour[k], w.spring[k]);
+      if (k < end) share = contact(i, j, w.spring[k]);
+      j = next;
       item.in_order(share, [&](const Share& s) {
         load.f += s.f, load.torque = axpy(s.lever, s.f_x_n, load.torque);
         load.slip += s.slip, load.viscous += s.viscous;
@@ -40,8 +44,8 @@ struct GrainTasks {
     for (int p = 0; p < bodies.planes; ++p) {
       const Plane& plane = bodies.plane[p];
       if (!(plane.gap(g.x, g.r) < w.margin)) continue;
-      const PlaneAction a =
-          plane_action<Planes, account>(w.scene, w.scene.dt, plane, g, w.plane_spring[bodies.planes * i + p]);
+      const PlaneAction a = plane_action<Planes, account>(
+          w.scene, w.scene.dt, plane, g, w.plane_spring[bodies.planes * i + p], w.material(i));
       load.f += a.f, load.torque += a.torque, load.slip += a.slip, load.viscous += a.viscous;
       for (int k = 0; k < bodies.servos; ++k) {
         const Servo& servo = bodies.servo[k];
@@ -71,7 +75,7 @@ struct GrainTasks {
               servo->share(w.scene, g.x) *
                   (servo->by_stress() ? servo->v : servo->next_velocity(w.scene.time(step), w.scene.dt)));
     const Triple dt(Vec3d{w.scene.dt, w.scene.dt, w.scene.dt});
-    const Mobility m = mobility(w.scene, g);
+    const Mobility m = mobility(w.scene, g, w.material(i));
     const Triple acceleration = m.acceleration(pushed(i, load).f),
                  spin_acceleration = m.spin_acceleration(load.torque);
     Kinematics<Triple> k{g.x, g.v, g.omega, g.rotation};
@@ -92,13 +96,16 @@ struct GrainTasks {
   };
 
   // What the contact with j does to i.
-  MORAINE_HD Share contact(Index i, Index j, Spring<double>& spring) const {
+  MORAINE_HD Share contact(Index i, Index j, SpringRow& kept) const {
     const GrainRow* const grain = w.grain[step & 1];
     const bool first = i < j;
-    const GrainRow &a = grain[first ? i : j], &b = grain[first ? j : i];
+    const GrainRow a = grain[first ? i : j], b = grain[first ? j : i];  // copies, read 16 bytes at a time
     const Geometry<double> g = between_grains(nearest_image(w.sides, a.x - b.x), a.r + b.r, a.r - b.r);
-    const Action<double> action = contact_law<Grains, account>(w.scene.with(Material::grain), w.scene.dt, g,
-                                                               {a.v - b.v, a.omega, b.omega}, spring);
+    const ContactParameters& law = w.scene.contact[w.order.pair(i, j)];
+    SpringRow spring = kept;  // read and written 16 bytes at a time, and only what the law uses
+    const Action<double> action =
+        contact_law<Grains, account>(law, w.scene.dt, g, {a.v - b.v, a.omega, b.omega}, spring);
+    kept = spring;
     if constexpr (Grains::couples) {
       if (first) return {action.f, action.slip, action.torque_on_i(g), 1, action.viscous};
       return {-action.f, 0, action.torque_on_j(g), 1, 0};

@@ -6,11 +6,14 @@
 
 namespace moraine::dem::gpu {
 
+// Aligned for loads of 16 bytes.
+struct alignas(16) SpringRow : Spring<double> {};
+
 struct GatherView {
   Scene scene;
   Sides sides;
   Index n;
-  ContactOrder order;  // chunks
+  ContactOrder order;  // chunks and materials
   double margin;       // m
   TallyLayout tallies;
   GrainRow* grain[2];
@@ -19,11 +22,12 @@ struct GatherView {
   const BodyId* part_of;
   const std::int64_t* row;
   const Index* neighbour;
-  Spring<double>*spring, *plane_spring;  // the latter by grain, then plane
-  Tally* tally[2];                       // by group
-  Tally* chunk_tally[2];                 // where blocks have whole chunks
+  SpringRow *spring, *plane_spring;  // the latter by grain, then plane
+  Tally* tally[2];                   // by group
+  Tally* chunk_tally[2];             // where blocks have whole chunks
   Control* control;
 
+  MORAINE_HD Material material(Index i) const { return order.material ? order.material[i] : Material::grain; }
   MORAINE_HD Index chunks() const { return (n + order.chunk - 1) / order.chunk; }
   MORAINE_HD Index groups() const { return (n + group_size - 1) / group_size; }
   MORAINE_HD Index chunk_groups() const { return order.chunk / group_size; }
