@@ -98,15 +98,20 @@ double weight_above(const dem::Scene& scene, const dem::State& s) {
   return 0.5 * weight / scene.area();
 }
 
+bool is_hertz(const cases::Case& c) { return c.law == cases::Case::Law::hertz; }
+
 constexpr double long_run = 7 * 86400, short_step = 1e-9, a_day = 86400;  // s
 
 // The step goes as r^1.5 k^-0.5, by the smallest grain.
 void print_what_would_do(const cases::Case& c, const dem::GradingSummary& sizes, double total) {
   std::printf(
-      "  shorter       the smallest grain, %.3g m wide, and the stiffness set the step: a tenth of the time "
+      "  shorter       the smallest grain, %.3g m wide, and k_n = %.3g N/m%s set the step: a tenth of the "
+      "time "
       "with "
       "4.6 times larger ones",
-      sizes.smallest);
+      sizes.smallest,
+      dem::stiffness_of(c.contact, dem::usual_contact(0.5 * sizes.smallest, 0.5 * sizes.smallest)),
+      is_hertz(c) ? " (at an overlap of a hundredth of its radius)" : "");
   const std::string where = !c.start.empty()                       ? "in the start"
                             : c.grains.distribution == "sieves"    ? "grains.sieves"
                             : c.grains.distribution == "lognormal" ? "grains.radius_min, or radius_mean"
@@ -177,10 +182,12 @@ void check_case(const Options& options) {
   std::printf("  memory        about %.0f MB\n", bytes_needed(n, c.has_water()) / 1e6);
 
   if (c.preset != "none" || c.softening != 1) {
+    const bool hertz = is_hertz(c);
     std::string f;
     for (const cases::Stage& stage : c.stages) f += cases::to_toml(stage.f) + " ";
-    std::printf("  preset        %s: f of the stages %s; stiffness divided by %g: k_n = %.4g N/m\n",
-                c.preset.c_str(), f.c_str(), c.softening, c.contact.k_n);
+    std::printf("  preset        %s: f of the stages %s; stiffness divided by %g: %s = %.4g %s\n",
+                c.preset.c_str(), f.c_str(), c.softening, hertz ? "young" : "k_n",
+                hertz ? c.elastic.young / c.softening : c.contact.k_n, hertz ? "Pa" : "N/m");
   }
 
   std::printf("  backend       %s\n", engine->describe().c_str());

@@ -57,7 +57,10 @@ TEST_F(CaseMaterials, PairsByRule) {
   const auto &quartz = s.between(Material::grain, Material::grain),
              &mixed = s.between(Material::grain, Material::grain_2),
              &clay = s.between(Material::grain_2, Material::grain_2);
-  EXPECT_EQ(mixed, s.between(Material::grain_2, Material::grain));
+  dem::ContactParameters mirrored = s.between(Material::grain_2, Material::grain);
+  std::swap(mirrored.density_i, mirrored.density_j);
+  EXPECT_EQ(mixed, mirrored);
+  EXPECT_EQ(mixed.density_j, 1800);
   EXPECT_EQ(quartz.k_n, 2e5);
   EXPECT_EQ(clay.k_n, 5e4);
   EXPECT_DOUBLE_EQ(mixed.k_n, 8e4);  // 2 k k'/(k + k')
