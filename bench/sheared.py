@@ -164,6 +164,39 @@ duration = 0.4
 zero_kinematics = false
 """, run=True)
 
+    def under(self, name, keys):
+        """As `sheared`, but the bed has gone on undamped with these lines in its [contact]."""
+        self.sheared()
+        return self.going_on(f"under-{name}", self.folder / "sheared-1x1", keys, run=True)
+
+    def going_on(self, name, bed, keys, wall_keys=(), run=False):
+        """A case that goes on shearing where that of `bed` ended, undamped, with these lines in [contact] and [wall].
+
+        Walls are smooth: they touch grains of the layers only.
+        """
+        lines, at_walls = "\n".join(keys), "\n".join(wall_keys)
+        return self._case(f"{name}-1x1", f"""\
+extends = "../{bed.name}"
+start = "../{bed.name}"
+stages = ["shear"]
+[contact]
+gamma_n = 0
+{lines}
+[wall]
+{at_walls}
+[output]
+series_interval = {settling}
+snapshot_interval = {settling}
+[[stage]]
+name = "shear"
+strain = 0
+duration = {settling if run else 1}
+zero_kinematics = false
+wall_mu = 0
+wall_gamma_n = 0
+wall_gamma_t = 0
+""", run=run)
+
     def case(self, scene, grains=grains_of_bed):
         copies = copies_for(grains)
         name = f"{scene}-{copies}x{copies}"

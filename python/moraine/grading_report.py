@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from scipy import stats
 
-from . import compaction, forces, measure, profile, shearing, strength
+from . import compaction, dilatancy, forces, measure, profile, shearing, strength
 from .case import Case, MissingData
 from .intervals import mean_interval, show
 from .page import LeftOut, Page, machine, version
@@ -338,6 +338,7 @@ captions = {
                 "Thin line: 5 % of the layer's, where the shear zone is taken to end.",
     "chains": "Normal forces between free grains at the end of the shear, in a slice two D50 thick across the middle, as wide as the force over σ_0 D50², at the highest "
               "normal stress. Grey: grains that the middle plane cuts.",
+    "taylor": f"At the highest normal stress. {dilatancy.caption}",
 }
 
 
@@ -376,11 +377,13 @@ def build(study, output, notes=None, say=print):
     for sigma, table in tables(rows).items():
         page.heading(f"At {sigma:g} kPa")
         page.table(["quantity", *(gradings[g] for g in present(rows))], table)
+    groups = {f"{gradings[g]}, {sigma:g} kPa": [r.stage for r in runs if r.grading == g and r.sigma_0 == sigma * 1e3] for sigma in stresses(rows) for g in present(rows)}
+    dilatancy.add(page, groups)
     for why in note:
         page.paragraph(why)
     if notes:
         page.notes(Path(notes).read_text())
-    page.figures({"curves": lambda: curves_figure(runs), "profiles": lambda: profiles_figure(runs), "chains": lambda: chains_figure(runs)},
+    page.figures({"curves": lambda: curves_figure(runs), "profiles": lambda: profiles_figure(runs), "chains": lambda: chains_figure(runs), "taylor": lambda: dilatancy.figure({k: v for k, v in groups.items() if k.endswith(f"{max(stresses(rows)):g} kPa")})},
                  captions, output / "figures")
     page.write(output, "Sizes of grains, with Moraine")
     say(str(output / "report.html"))

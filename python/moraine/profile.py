@@ -88,3 +88,25 @@ def loosened_depth(before, after):
     if not gain.any():
         return np.nan
     return float((gain * (after.top_wall - middle)).sum() / gain.sum() / (2 * after.grains["radius"].mean()))
+
+
+def inside(count):
+    """Points spread evenly in a ball of radius 1, count x 3: each stands for as much of its volume."""
+    k = np.arange(count) + 0.5
+    # Radii by volume; directions by a spiral whose turns do not keep step with the radii.
+    radius, z = np.cbrt(k / count), 1 - 2 * np.mod(k * 0.7548776662, 1)
+    turn = 2 * np.pi * np.mod(k * 0.5698402910, 1)
+    across = np.sqrt(1 - z**2)
+    return radius[:, None] * np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
+
+
+def section_porosity(snapshot, cells_y, cells_z, points=300):
+    """Porosity of columns along x: cells_y x cells_z between the sides in y and between floor and top wall; in y the box is periodic.
+    Each sphere counts as so many points, which leaves an error of some 0.002 in a cell of one diameter."""
+    x, r = snapshot.grains["position"], snapshot.grains["radius"]
+    ball = inside(points)
+    y = (x[:, 1, None] + r[:, None] * ball[:, 1]) % snapshot.box[1]
+    z = x[:, 2, None] + r[:, None] * ball[:, 2]
+    volume = np.repeat(4 / 3 * np.pi * r**3 / points, points)
+    solid, *_ = np.histogram2d(y.ravel(), z.ravel(), (cells_y, cells_z), ((0, snapshot.box[1]), (0, snapshot.top_wall)), weights=volume)
+    return 1 - solid / (snapshot.area * snapshot.top_wall / (cells_y * cells_z))

@@ -5,7 +5,7 @@ import importlib
 from .case import MissingData
 from .study import read
 
-reports = ("paper", "hardening", "creep", "grading")   # NAME: build(study, output, notes) of NAME_report.py
+reports = ("paper", "hardening", "creep", "grading", "angular", "lateral", "hysteresis")   # NAME: build(study, output, notes) of NAME_report.py
 
 
 def arguments(parser):

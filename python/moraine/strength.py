@@ -105,8 +105,8 @@ class Taylor:
 
     @property
     def at_peak(self):
-        """Index of the smoothed peak."""
-        return int(np.nanargmax(self.friction))
+        """Index of the smoothed peak, of the rows whose dilation rate is known."""
+        return int(np.nanargmax(np.where(np.isfinite(self.rate), self.friction, np.nan)))
 
 
 def taylor(stage):

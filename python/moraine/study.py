@@ -3,7 +3,7 @@
 study.toml names the cases of the study, directories beside it, each once for each seed:
 
     title = "..."                 of its report
-    report = "paper"              which report: paper, hardening, creep or grading (moraine.report)
+    report = "paper"              which report (moraine.report)
     seeds = 3                     how many packings, where --seeds does not say
 
     [[case]]
@@ -136,8 +136,8 @@ class Study:
         if not self.seeds:
             self.seeds = list(range(1, quick.get("seeds", what.get("seeds", 1)) + 1))
         what["case"] = [case for case in what["case"] if not (self.quick and case.get("quick") is False)]
-        lists = {k: v for case in what["case"] for k, v in case.get("lists", {}).items()} | quick.get("lists", {}) | self.lists
-        self.parts = {case["name"]: Part(case["name"], case.get("start", ""), {k: lists[k] for k in case.get("lists", {})},
+        other = quick.get("lists", {}) | self.lists  # instead of those of each case
+        self.parts = {case["name"]: Part(case["name"], case.get("start", ""), {k: other.get(k, v) for k, v in case.get("lists", {}).items()},
                                          stages_of((Path(self.home) / case["name"]).resolve()),
                                          (case.get("quick") or {}) if self.quick else {}) for case in what["case"]}
         for key in self.lists:

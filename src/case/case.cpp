@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "case/keys.hpp"
+#include "case/materials.hpp"
 #include "case/preset.hpp"
 #include "case/read.hpp"
 #include "error.hpp"
@@ -16,6 +17,8 @@ namespace fs = std::filesystem;
 using std::string;
 
 bool is_stage_key(const Key& key) { return key.table() == "stage."; }
+// Of a list of tables: a stage, a material or a pair.
+bool is_listed(const Key& key) { return is_list_of_tables(split(key.name, ".")[0]); }
 
 struct Context {
   const Entries* above;  // keys that a stage may take defaults from
@@ -337,13 +340,22 @@ string last_kind(const fs::path& start) {
   }
 }
 
+// Whether this key of a stage is of contacts, so that each pair of materials may have its own.
+bool differs_by_material(const string& name) { return find("contact." + name) || name.starts_with("wall_"); }
+// Whether a stage gives no value of its own, so that each pair has its own.
+bool is_left_to_materials(const Draft& draft, const Key& key, const Entries& entries) {
+  const auto entry = entries.find(key.name);
+  if (draft.materials.empty() || !is_stage_key(key) || entry == entries.end()) return false;
+  return entry->second.stated.ends_with("(by default)") && differs_by_material(key.name.substr(6));
+}
+
 // As a case.toml in SI.
 string text_of(const Draft& draft) {
   string text, table;
   const auto add = [&](const Key& key, const Entries& entries) {
     const auto entry = entries.find(key.name);
     if (!key.set || entry == entries.end()) return;
-    if (!is_stage_key(key) && key.table() != table) {
+    if (!is_listed(key) && key.table() != table) {
       table = key.table();
       text += "\n[" + table.substr(0, table.size() - 1) + "]\n";
     }
@@ -351,12 +363,16 @@ string text_of(const Draft& draft) {
     text += (key.unit.empty() || key.unit == "1" ? "" : "  # " + key.unit) + "\n";
   };
   for (const Key& key : keys())
-    if (!is_stage_key(key)) add(key, draft.entries);
-  for (const StageDraft& stage : draft.stages) {
-    text += "\n[[stage]]\n";
-    for (const Key& key : keys())
-      if (is_stage_key(key)) add(key, stage.entries);
-  }
+    if (!is_listed(key)) add(key, draft.entries);
+  const auto add_list = [&](const string& name, const std::vector<StageDraft>& list) {
+    for (const StageDraft& one : list) {
+      text += "\n[[" + name + "]]\n";
+      for (const Key& key : keys())
+        if (key.table() == name + "." && !is_left_to_materials(draft, key, one.entries))
+          add(key, one.entries);
+    }
+  };
+  add_list("material", draft.materials), add_list("pair", draft.pairs), add_list("stage", draft.stages);
   return text;
 }
 
@@ -381,7 +397,7 @@ Case load_checked(const fs::path& directory, const std::vector<Override>& overri
 
   const Context context{&draft.entries, file + ": ", "", ""};
   for (const Key& key : keys()) {
-    if (is_stage_key(key)) continue;
+    if (is_listed(key)) continue;
     add_default(key, draft.entries, context);
     if (key.set) key.set(key, c, no_stage, draft.entries.at(key.name).value);
   }
@@ -398,6 +414,9 @@ Case load_checked(const fs::path& directory, const std::vector<Override>& overri
     if (s.entries.contains("stage.kind")) context.kind = std::get<string>(s.entries.at("stage.kind").value);
     kind_before = context.kind;
     Stage& stage = c.stages.emplace_back();
+    if (!draft.materials.empty())
+      for (const auto& [name, entry] : s.entries)
+        if (differs_by_material(name.substr(6))) stage.own.insert(name.substr(6));
     for (const Key& key : keys()) {
       if (!is_stage_key(key)) continue;
       add_default(key, s.entries, context);
@@ -406,6 +425,7 @@ Case load_checked(const fs::path& directory, const std::vector<Override>& overri
     }
     check_stage(s.entries, draft.entries, context);
   }
+  read_materials(draft, c);
   c.resolved = text_of(draft);
   return c;
 }
@@ -444,7 +464,8 @@ std::vector<Change> changes(const string& resolved_before, const Case& now) {
   for (auto& [name, values] : both) {
     if (values.first == values.second) continue;
     const auto dot = name.rfind('.');
-    const Key* key = find(name.starts_with("stage.") ? "stage" + name.substr(dot) : name);
+    const string table = split(name, ".")[0];
+    const Key* key = find(is_list_of_tables(table) ? table + name.substr(dot) : name);
     for (string* value : {&values.first, &values.second})
       if (value->empty())
         *value = "nothing";
@@ -481,6 +502,15 @@ string extension_text(const fs::path& directory, const std::vector<Override>& ov
     if (!stage.entries.empty()) stage.entries["stage.name"] = name;
   }
   std::erase_if(draft.stages, [](const StageDraft& stage) { return stage.entries.empty(); });
+  for (auto* list : {&draft.materials, &draft.pairs}) {
+    for (StageDraft& one : *list) {
+      const string key = list == &draft.pairs ? "pair.of" : "material.name";
+      const Entry name = one.entries.at(key);
+      keep_overrides(one.entries);
+      if (!one.entries.empty()) one.entries[key] = name;
+    }
+    std::erase_if(*list, [](const StageDraft& one) { return one.entries.empty(); });
+  }
   return "extends = " + to_toml(base) + "\nstages = " + to_toml(stages) + "\n" + text_of(draft);
 }
 

@@ -3,6 +3,8 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -32,11 +34,27 @@ struct Grains {
   std::string placement;                     // "lattice", "random"
   double solid_fraction;                     // random
   double density;                            // kg/m3
+  std::string material;                      // of those that no material takes; empty: of the only one
   std::uint64_t seed;
   std::int64_t columns_x, columns_y;  // of the starting lattice
   double cell;                        // side of a lattice cell in largest grain diameters
   bool operator==(const Grains&) const = default;
 };
+
+// A material of grains or walls.
+struct GrainMaterial {
+  std::string name;
+  std::map<std::string, double> of;  // its keys by name ("mu_s", "density"), SI; those not given by contact.*
+  std::vector<double> sizes, layer;  // m, from, to: diameters and heights of the grains it takes; empty: none
+  bool operator==(const GrainMaterial&) const = default;
+};
+// What [[pair]] says of two materials, in whatever order; "wall" stands for walls.
+struct MaterialPair {
+  std::string first, second;
+  std::map<std::string, double> given;
+  bool operator==(const MaterialPair&) const = default;
+};
+enum class PairRule { geometric, minimum, table };
 
 // What water does at a side of the box.
 struct FluidSide {
@@ -69,6 +87,7 @@ struct Fluid {
 };
 
 struct Stage {
+  std::set<std::string> own;  // with materials: keys of contacts that it gives itself, "mu_s"
   enum class FluidTop { drained, impermeable };
   enum class FluidBottom { no_flow, pressure, flux };
   enum class Kind { settle, consolidate, shear, shear_stress, uniaxial, press };
@@ -154,9 +173,14 @@ struct Case {
   Law law;
   Elastic elastic, wall_elastic;
   double restitution, wall_restitution;
-  // What contact.* and wall.* say, the law's stiffness included (k_n of walls is that of contacts); stages have
-  // their own damping and friction.
+  // What contact.* and wall.* say, the law's stiffness included (k_n of walls is that of contacts); stages
+  // have their own damping and friction.
   dem::ContactParameters contact, wall;
+  std::vector<GrainMaterial> materials;  // of grains; empty: one that has no name
+  std::vector<GrainMaterial> of_walls;   // one, where wall.material names it
+  std::vector<MaterialPair> pairs;
+  PairRule pair_rule;
+  std::string wall_material;
   double wall_mass;         // kg; 0: 0.001 of the mass of N spheres as wide as a lattice cell
   double gravity;           // m/s2
   double slope;             // rad, of the ground, down towards +x

@@ -144,7 +144,7 @@ Bed read_bed(const fs::path& path) {
   grain.mu_s = p[3], grain.mu_d = p[4];
   wall.k_n = k.x, wall.k_t = 0, wall.gamma_n = p[6], wall.gamma_t = p[7];
   wall.mu_s = wall.mu_d = p[9];  // viscous below the dynamic limit, no spring
-  scene.density = p[10];
+  scene.density.fill(p[10]);
 
   s.id.resize(n);
   std::iota(s.id.begin(), s.id.end(), 0);
@@ -170,7 +170,7 @@ std::string case_text(const Bed& bed, const std::string& file) {
   line("x", bed.scene.box.x), line("y", bed.scene.box.y), line("z", bed.scene.box.z);
   line("periodic", std::string("xy"));
   text << "\n[grains]\n";
-  line("density", bed.scene.density);
+  line("density", bed.scene.density_of(dem::Material::grain));
   text << "\n[contact]\n";
   line("k_n", grain.k_n), line("k_t", grain.k_t);
   line("gamma_n", grain.gamma_n), line("gamma_t", grain.gamma_t);
@@ -181,7 +181,8 @@ std::string case_text(const Bed& bed, const std::string& file) {
           "= \"0.1 s\"\n";
   // Damping beyond the critical one makes explicit steps chatter: the run would be refused.
   const double r_min = *std::min_element(bed.state.r.begin(), bed.state.r.end());
-  const double critical = 2 * std::sqrt(grain.k_n * dem::sphere_mass(bed.scene.density, r_min));
+  const double critical =
+      2 * std::sqrt(grain.k_n * dem::sphere_mass(bed.scene.density_of(dem::Material::grain), r_min));
   const auto damping = [&](const char* key, double of_file) {
     line(key, std::min(of_file, critical));
     if (of_file > critical)

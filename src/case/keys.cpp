@@ -126,6 +126,38 @@ std::vector<Key> side_rows(const string& name, const string& place) {
   };
 }
 
+// What a [[material]] may have of its own, and a [[pair]] of two: the rows of `contact` again. A further one
+// that differs from material to material has its name here.
+const std::vector<string> of_materials = {"k_n",     "k_t",      "young",   "poisson",     "gamma_n",
+                                          "gamma_t", "mu_s",     "mu_d",    "restitution", "mu_roll",
+                                          "k_roll",  "mu_twist", "k_twist", "cohesion"};
+bool of_one_alone(const string& name) { return name == "young" || name == "poisson"; }
+std::vector<Key> rows_of_materials(const std::vector<Key>& table) {
+  // clang-format off
+  std::vector<Key> rows{
+      {"material.name", Type::text, "", required, "", "unique; letters, digits, - and _", "", set_nothing},
+      {"material.density", Type::number, "kg/m3", "grains.density", "> 0", "of these grains", "", set_nothing},
+      {"material.sizes", Type::list, "", "[]", "", "grains with diameters from the first of two lengths to below the second are of this material: [\"1 mm\", \"2 cm\"]", "", set_nothing},
+      {"material.layer", Type::list, "", "[]", "", "grains whose centres begin at heights from the first of two lengths to below the second are of this material: [\"0 m\", \"0.1 m\"]", "", set_nothing}};
+  // clang-format on
+  const auto append_for = [&](const string& owner, const string& fallback, const string& meaning) {
+    for (const string& name : of_materials) {
+      if (owner == "pair." && of_one_alone(name)) continue;
+      Key key = *std::find_if(table.begin(), table.end(),
+                              [&](const Key& k) { return k.name == "contact." + name; });
+      key.name = owner + name, key.set = set_nothing,
+      key.fallback = fallback.empty() ? "contact." + name : fallback;
+      key.meaning = split(key.meaning, "; a stage")[0].substr(0, key.meaning.find(", at most")) + meaning;
+      rows.push_back(key);
+    }
+  };
+  append_for("material.", "", " of its grains among each other, where a stage has none of its own");
+  rows.push_back(
+      {"pair.of", Type::list, "", required, "", "two materials, or one and \"wall\"", "", set_nothing});
+  append_for("pair.", "contact.pairs", " between the two, where a stage has none of its own");
+  return rows;
+}
+
 void append(std::vector<Key>& table, const std::vector<Key>& rows) {
   table.insert(table.end(), rows.begin(), rows.end());
 }
@@ -171,6 +203,7 @@ std::vector<Key> make_keys() {
       row<grains, &G::fractal_dimension>("grains.fractal_dimension", "1", "2.6", "> 0", "fractal: as many grains are larger than r as r^-D; 3: the same mass at each size"),
       row<grains, &G::sieves>("grains.sieves", "", "\"\"", "", "sieves: a CSV file with the columns size (m) and finer (1, by mass), or other units: size (mm), finer (%)"),
       row<grains, &G::density>("grains.density", "kg/m3", "2600", "> 0", "of the grains"),
+      row<grains, &G::material>("grains.material", "", "\"\"", "", "of all grains that no [[material]] takes by size or layer; empty: there is one material only, or a table of grains says it"),
       row<grains, &G::seed>("grains.seed", "", "1", ">= 0", "of the random radii and places"),
       row<grains, &G::placement>("grains.placement", "", "\"lattice\"", "lattice | random", "where grains begin: one in each cell of a lattice; or anywhere in box.x and box.y (and box.z where z is periodic), largest first"),
       row<grains, &G::solid_fraction>("grains.solid_fraction", "1", "0.25", "0.001 .. 0.35", "random: share of the space that the grains fill at first"),
@@ -193,8 +226,10 @@ std::vector<Key> make_keys() {
       row<contact, &P::mu_twist>("contact.mu_twist", "1", "0", ">= 0", "resistance to twisting about the normal: the couple is at most mu_twist R f_n; 0: none"),
       row<contact, &P::k_twist>("contact.k_twist", "N/m", "contact.k_roll", ">= 0", "stiffness against twisting before that, as a force at R"),
       row<contact, &P::cohesion>("contact.cohesion", "N", "0", ">= 0", "constant pull of grains that touch, which friction does not see"),
+      row<&C::pair_rule>("contact.pairs", "", "\"geometric\"", "geometric | minimum | table", "of grains of unlike materials: the geometric mean of friction, rolling, restitution and viscosity, the smaller one, or what [[pair]] says, which is then needed for all; what a [[pair]] leaves out is geometric; stiffnesses are those of two springs in series, 2 k_1 k_2/(k_1 + k_2), or Hertz's for young and poisson"),
 
       row<wall, &P::k_t>("wall.k_t", "N/m", "0", ">= 0", "tangential stiffness against walls; k_n is that of contacts"),
+      row<&C::wall_material>("wall.material", "", "\"\"", "", "a [[material]] that floor and walls are of, so that contact.pairs says what is between them and grains, but for viscosities; empty: they have the keys of [wall], and the grain's k_n"),
       row<&C::wall_elastic, &E::young>("wall.young", "Pa", "contact.young", ">= 0", "hertz: Young's modulus of walls; slip at walls takes wall_mu"),
       row<&C::wall_elastic, &E::poisson>("wall.poisson", "1", "contact.poisson", "0 .. 0.5", "hertz: Poisson's ratio of walls"),
       row<&C::wall_restitution>("wall.restitution", "1", "1", "0.05 .. 1", "coefficient of restitution against walls, by damping beside their gamma_n; a stage may have its own"),
@@ -240,6 +275,7 @@ std::vector<Key> make_keys() {
   append(table, side_rows<&F::x_high>("x_high", "x = box.x"));
   append(table, side_rows<&F::y_low>("y_low", "y = 0"));
   append(table, side_rows<&F::y_high>("y_high", "y = box.y"));
+  append(table, rows_of_materials(table));
   std::vector<Key> of_stages{
       // clang-format off
       row<&S::name>("stage.name", "", required, "", "unique; letters, digits, - and _"),
@@ -362,7 +398,9 @@ bool is_about(const Key& key, const std::vector<string>& words) {
   // "stage.shear.mu_s", as it is set, is stage.mu_s in the table.
   const auto as_key = [](const string& word) {
     const auto first = word.find('.'), last = word.rfind('.');
-    return word.starts_with("stage.") ? word.substr(0, first) + word.substr(last) : word;
+    return is_list_of_tables(word.substr(0, first)) && last != word.npos
+               ? word.substr(0, first) + word.substr(last)
+               : word;
   };
   return std::all_of(words.begin(), words.end(),
                      [&](const string& word) { return text.find(plain(as_key(word))) != text.npos; });
@@ -394,6 +432,10 @@ const Key* find(const string& name) {
   return k == keys().end() ? nullptr : &*k;
 }
 
+bool is_list_of_tables(const string& table) {
+  return table == "stage" || table == "material" || table == "pair";
+}
+
 string word_of(const Key& key) {
   const auto accepted = split(key.accepts, " | ");
   return key.type == Type::number && accepted.size() == 2 ? accepted[1] : "";
@@ -423,6 +465,7 @@ string suggestion(const string& unknown_key, const string& shown) {
   const string table = unknown_key.substr(0, unknown_key.find('.') + 1), unknown = leaf(unknown_key);
   std::vector<string> siblings, others;
   for (const Key& key : keys()) {
+    if (key.table() != table && (key.table() == "material." || key.table() == "pair.")) continue;
     if (key.table() == table) siblings.push_back(leaf(key.name));
     others.push_back(key.name);
     // The right name in the wrong table.
@@ -492,7 +535,7 @@ string reference(const std::vector<string>& words) {
     if (key.table() != table) {
       table = key.table();
       const string name = table.substr(0, table.find('.'));
-      if (!table.empty()) out += table == "stage." ? "\n[[stage]]\n" : "\n[" + name + "]\n";
+      if (!table.empty()) out += is_list_of_tables(name) ? "\n[[" + name + "]]\n" : "\n[" + name + "]\n";
     }
     out += "  " + pad(leaf(key.name), 25) + pad(key.fallback + (key.unit == "1" ? "" : " " + key.unit), 35) +
            key.meaning + (key.accepts.empty() ? "" : " (" + key.accepts + ")") +

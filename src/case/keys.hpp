@@ -34,6 +34,9 @@ struct Key {
   std::string table() const { return name.substr(0, name.find('.') + 1); }  // "contact.", or ""
 };
 
+// Whether a file may have many of these tables, each headed by its name in double brackets.
+bool is_list_of_tables(const std::string& table);  // "stage"
+
 inline const std::string required = "(required)";  // a `fallback`
 
 const std::vector<Key>& keys();            // a default refers only to rows above its own

@@ -159,15 +159,28 @@ Value parse_bare(const Key& key, const string& text) {
 
 string& text_in(Entry& entry) { return std::get<string>(entry.value); }
 
-// "name" of a stage, or an error that lists them.
-StageDraft& stage(Draft& draft, const string& name) {
-  std::vector<string> names;
-  for (StageDraft& s : draft.stages) {
-    if (s.name == name) return s;
-    names.push_back(s.name);
-  }
-  throw error("no stage \"", name, "\"; stages: ", join(names, ", "));
+// A pair has no first and second.
+string turned_round(const string& table, const StageDraft& draft) {
+  const auto of = draft.entries.find(table + ".of");
+  if (of == draft.entries.end()) return draft.name;
+  const auto& names = std::get<std::vector<string>>(of->second.value);
+  return names.at(1) + "-" + names.at(0);
 }
+std::vector<StageDraft>::iterator find_in(std::vector<StageDraft>& list, const string& table,
+                                          const string& name) {
+  return std::find_if(list.begin(), list.end(), [&](const StageDraft& s) {
+    return s.name == name || (table == "pair" && turned_round(table, s) == name);
+  });
+}
+// "name" of a table, or an error that lists them.
+StageDraft& listed(Draft& draft, const string& table, const string& name) {
+  std::vector<StageDraft>& list = draft.list(table);
+  if (const auto found = find_in(list, table, name); found != list.end()) return *found;
+  std::vector<string> names;
+  for (const StageDraft& s : list) names.push_back(s.name);
+  throw error("no ", table, " \"", name, "\"; ", table, "s: ", names.empty() ? "none" : join(names, ", "));
+}
+StageDraft& stage(Draft& draft, const string& name) { return listed(draft, "stage", name); }
 
 void select_stages(Draft& draft) {
   const auto found = draft.entries.find("stages");
@@ -210,8 +223,8 @@ class File {
   void merge_into(Draft& draft) const {
     for (const auto& [name, node] : table_) {
       const string table = string(name.str());
-      if (table == "stage")
-        merge_stages(node, draft);
+      if (is_list_of_tables(table))
+        merge_list(table, node, draft);
       else if (table != "extends")
         merge_key(table, node, draft);
     }
@@ -266,38 +279,48 @@ class File {
     draft.entries[name] = read(*key, name, node);
   }
 
-  void merge_stages(const toml::node& node, Draft& draft) const {
-    const toml::array* stages = node.as_array();
-    if (!stages || !std::all_of(stages->begin(), stages->end(), [](auto& s) { return s.is_table(); }))
-      throw error(at(node), "stage: expected stages, each headed by [[stage]]");
-    std::vector<string> seen;
-    for (const toml::node& element : *stages) {
-      const toml::table& table = *element.as_table();
-      const toml::node* name_node = table.get("name");
-      if (!name_node) throw error(at(element), "stage.name is missing; expected name = \"...\", unique");
-      Entry name_entry = read(*find("stage.name"), "stage.name", *name_node);
-      const string name = text_in(name_entry);
-      if (name.empty() ||
-          name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_") !=
-              name.npos)
-        throw error(name_entry.stated, ": expected letters, digits, - and _");
-      if (std::count(seen.begin(), seen.end(), name))
-        throw error(name_entry.stated, ": there is another stage of this name; expected a unique one");
-      seen.push_back(name);
+  // What a table of a list is called: by its name, or by the two materials of a pair.
+  std::pair<string, string> name_of(const string& list, const toml::node& element) const {
+    const string key_name = list + (list == "pair" ? ".of" : ".name");
+    const toml::node* node = element.as_table()->get(list == "pair" ? "of" : "name");
+    if (!node)
+      throw error(at(element), key_name, " is missing; expected ",
+                  list == "pair" ? "of = [\"...\", \"...\"], two materials" : "name = \"...\", unique");
+    Entry entry = read(*find(key_name), key_name, *node);
+    if (list == "pair") {
+      const auto& of = std::get<std::vector<string>>(entry.value);
+      if (of.size() != 2) throw error(entry.stated, ": expected two materials, or one and \"wall\"");
+      return {of[0] + "-" + of[1], entry.stated};
+    }
+    const string name = text_in(entry);
+    if (name.empty() || name.find_first_not_of(
+                            "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_") != name.npos)
+      throw error(entry.stated, ": expected letters, digits, - and _");
+    return {name, entry.stated};
+  }
 
-      auto target =
-          std::find_if(draft.stages.begin(), draft.stages.end(), [&](auto& s) { return s.name == name; });
-      if (target == draft.stages.end())
-        target = draft.stages.insert(target, {name, at(element) + "stage." + name, {}});
-      for (const auto& [leaf, value] : table) {
-        const string key_name = "stage." + string(leaf.str()),
-                     shown = "stage." + name + "." + string(leaf.str());
+  void merge_list(const string& list, const toml::node& node, Draft& draft) const {
+    const toml::array* tables = node.as_array();
+    if (!tables || !std::all_of(tables->begin(), tables->end(), [](auto& s) { return s.is_table(); }))
+      throw error(at(node), list, ": expected ", list, "s, each headed by [[", list, "]]");
+    std::vector<StageDraft> seen;
+    for (const toml::node& element : *tables) {
+      const auto [name, stated] = name_of(list, element);
+      if (find_in(seen, list, name) != seen.end())
+        throw error(stated, ": there is another ", list, " of this name; expected a unique one");
+      std::vector<StageDraft>& drafts = draft.list(list);
+      auto target = find_in(drafts, list, name);
+      if (target == drafts.end()) target = drafts.insert(target, {name, at(element) + list + "." + name, {}});
+      for (const auto& [leaf, value] : *element.as_table()) {
+        const string key_name = list + "." + string(leaf.str()),
+                     shown = list + "." + name + "." + string(leaf.str());
         const Key* key = find(key_name);
         if (!key)
           throw error(at(value), shown, " = ", text_of(value), ": unknown key; ",
-                      suggestion(key_name, "stage." + name + "."));
+                      suggestion(key_name, list + "." + name + "."));
         target->entries[key_name] = read(*key, shown, value);
       }
+      seen.push_back(*target);
     }
   }
 
@@ -335,7 +358,8 @@ std::vector<string> full_names(const Draft& draft, const Override& o) {
   if (o.key.find('.') != o.key.npos || find(o.key)) return {o.key};
   std::vector<string> found, names, stages;
   for (const Key& key : keys())
-    if (key.name.substr(key.table().size()) == o.key) found.push_back(key.name);
+    if (key.name.substr(key.table().size()) == o.key && key.table() != "material." && key.table() != "pair.")
+      found.push_back(key.name);
   if (found.empty()) return {o.key};
   if (found.size() > 1) throw error(stated_as(o), ": expected the full name, one of ", join(found, ", "));
   if (!found[0].starts_with("stage.")) return found;
@@ -351,14 +375,16 @@ std::vector<string> full_names(const Draft& draft, const Override& o) {
 
 void set(Draft& draft, const string& full_name, const Override& o) {
   const string stated = stated_as(o);
-  if (full_name.starts_with("stage.")) {
-    const auto dot = full_name.rfind('.');
-    const string name = dot < 6 ? full_name.substr(6) : full_name.substr(6, dot - 6),
-                 key_name = "stage." + full_name.substr(dot + 1);
-    StageDraft& target = about(stated, [&]() -> StageDraft& { return stage(draft, name); });
+  const string table = split(full_name, ".")[0];
+  if (full_name.size() > table.size() && is_list_of_tables(table)) {
+    const std::size_t begin = table.size() + 1, dot = full_name.rfind('.');
+    const string name = dot < begin ? full_name.substr(begin) : full_name.substr(begin, dot - begin),
+                 key_name = table + "." + full_name.substr(dot + 1);
+    StageDraft& target = about(stated, [&]() -> StageDraft& { return listed(draft, table, name); });
     const Key* key = find(key_name);
-    if (!key) throw error(stated, ": unknown key; ", suggestion(key_name, "stage." + name + "."));
-    if (key_name == "stage.name") throw error(stated, ": a stage keeps its name");
+    if (!key) throw error(stated, ": unknown key; ", suggestion(key_name, table + "." + name + "."));
+    if (key_name.ends_with(".name") || key_name == "pair.of")
+      throw error(stated, ": a ", table, " keeps its name");
     target.entries[key_name] = {about(stated, [&] { return parse_bare(*key, o.value); }), stated};
   } else {
     const Key* key = find(full_name);
@@ -403,6 +429,14 @@ std::map<string, string> read_resolved(const string& text) {
   take("", all);
   for (const auto& [name, node] : all)
     if (const toml::table* table = node.as_table()) take(string(name.str()) + ".", *table);
+  if (const toml::array* list = all["material"].as_array())
+    for (const toml::node& one : *list)
+      take("material." + (*one.as_table())["name"].value_or(string()) + ".", *one.as_table());
+  if (const toml::array* list = all["pair"].as_array())
+    for (const toml::node& one : *list) {
+      const toml::table& pair = *one.as_table();
+      take("pair." + pair["of"][0].value_or(string()) + "-" + pair["of"][1].value_or(string()) + ".", pair);
+    }
   if (const toml::array* list = all["stage"].as_array())
     for (const toml::node& stage : *list) {
       stages.push_back((*stage.as_table())["name"].value_or(string()));

@@ -17,6 +17,7 @@ struct Entry {
 inline const std::string by_set = "--set ";    // how `stated` begins where an override has set the value
 using Entries = std::map<std::string, Entry>;  // by name in the table of keys
 
+// One of the tables of a list: a stage, a material, a pair of these ("quartz-clay").
 struct StageDraft {
   std::string name;
   std::string stated;  // "cases/x/case.toml:20: stage.shear", where it first appears
@@ -25,7 +26,11 @@ struct StageDraft {
 
 struct Draft {
   Entries entries;
-  std::vector<StageDraft> stages;
+  std::vector<StageDraft> stages, materials, pairs;
+
+  std::vector<StageDraft>& list(const std::string& table) {  // "stage"
+    return table == "stage" ? stages : table == "material" ? materials : pairs;
+  }
 };
 
 // Throws Error, see case.hpp.

@@ -30,7 +30,7 @@ std::vector<double> first_guess(const fluid::Grid& grid) {
 // Largest w^2 of grains (and an impermeable wall) on the stiffness of undrained water, by power iteration on
 // M^-1 B^T D^T C^-1 D B, from above by its last change.
 double water_frequency(const Skeleton& skeleton, const Water& water, const std::vector<double>& storage,
-                       const dem::Scene& scene) {
+                       const dem::Scene& scene, const dem::State& grains) {
   const fluid::Grid& grid = skeleton.grid();
   const Mapping& mapping = skeleton.mapping();
   const std::vector<double>& volume = skeleton.volume();
@@ -54,7 +54,8 @@ double water_frequency(const Skeleton& skeleton, const Water& water, const std::
     find_thrust(skeleton, sides, Closure::full, 0, p, thrust);
     for (dem::Index c = 0; c < mapping.chunks(); ++c) mapping.push(c, thrust.to_push, force.data());
     for (std::size_t i = 0; i < d.size(); ++i)
-      d[i] = (1 / scene.inertial_mass_of_volume(volume[i])) * force[i].f;
+      d[i] = (1 / scene.inertial_mass_of_volume(volume[i], grains.material_of(static_cast<dem::Index>(i)))) *
+             force[i].f;
     mapping.apply(d, u);
     if (water.top == TopSide::impermeable) {
       const double a = wall_mass > 0 ? mean_below_top(grid, p) * scene.area() / wall_mass : 0;
@@ -82,7 +83,7 @@ Stability stability_of(const Skeleton& skeleton, const Water& water, const std::
   s.w_sk = std::sqrt(dem::spectrum(scene, grains).stiffness);
   // A bed that has not met yet will.
   s.w_sk = std::max(s.w_sk, 2 / dem::one_contact_step(scene, grains));
-  s.w_f = std::sqrt(water_frequency(skeleton, water, storage, scene));
+  s.w_f = std::sqrt(water_frequency(skeleton, water, storage, scene, grains));
   s.longest_dt = most_of_limit * 2 / std::hypot(s.w_sk, s.w_f);
   s.longest = static_cast<std::int64_t>(s.longest_dt / scene.dt);
   return s;

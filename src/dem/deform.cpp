@@ -26,13 +26,12 @@ double solid_volume(const State& s) {
 BoxStress box_stress(const Scene& scene, const State& s) {
   const Sides sides = Sides::of(scene);
   BoxStress out;
-  const ContactParameters& law = scene.with(Material::grain);
-  double stiffness = 0;  // sum of k l^2
+  double stiffness = 0;  // sum of k l^2, N m
   for (const ContactForce& c : contact_forces(scene, s)) {
     const Vec3d x_ij = nearest_image(sides, s.x[c.i] - s.x[c.j]);
     out.normal += times(c.f_n + c.f_t, x_ij);
     const Geometry<double> g = between_grains(x_ij, s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]);
-    stiffness += stiffness_of(law, g) * dot(x_ij, x_ij);
+    stiffness += stiffness_of(scene.between(s.material_of(c.i), s.material_of(c.j)), g) * dot(x_ij, x_ij);
   }
   const double volume = box_volume(scene);
   out.normal = (1 / volume) * out.normal;
@@ -42,9 +41,9 @@ BoxStress box_stress(const Scene& scene, const State& s) {
 
 SpringEnergy spring_energy(const Scene& scene, const State& s) {
   const Sides sides = Sides::of(scene);
-  const ContactParameters& law = scene.with(Material::grain);
   SpringEnergy e;
   for (const Contact& c : s.contacts) {
+    const ContactParameters& law = scene.between(s.material_of(c.i), s.material_of(c.j));
     const Vec3d x_ij = nearest_image(sides, s.x[c.i] - s.x[c.j]);
     const Geometry<double> g = between_grains(x_ij, s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]);
     if (g.delta_n < 0) e.normal += GeneralLaw::stored_normal(law, g, 0);
@@ -56,10 +55,10 @@ SpringEnergy spring_energy(const Scene& scene, const State& s) {
 double kinetic_energy(const Scene& scene, const State& s) {
   double sum = 0;
   for (Index i = 0; i < s.size(); ++i) {
-    const double m = scene.inertial_mass(s.r[i]), inertia = 0.4 * m * s.r[i] * s.r[i];
+    const double m = scene.inertial_mass(s.r[i], s.material_of(i)), inertia = 0.4 * m * s.r[i] * s.r[i];
     Vec3d v = s.v[i], omega = s.omega[i];
     if (s.staggered) {
-      const Mobility mob = mobility(scene, s.r[i], s.part_of[i]);
+      const Mobility mob = mobility(scene, s.r[i], s.material_of(i), s.part_of[i]);
       v = axpy(scene.dt, mob.acceleration(kick(scene, s, i)), v);
       omega = axpy(scene.dt, mob.spin_acceleration(s.torque[i]), omega);
     }
@@ -76,7 +75,7 @@ void deform(Scene& scene, State& s, const Vec3d& factor) {
     const Vec3d old = nearest_image(sides, s.x[c.i] - s.x[c.j]), moved = times(strain, old);
     const Geometry<double> g = between_grains(old + moved, s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]);
     const Vec3d none{0, 0, 0};
-    if (Coulomb::keeps(scene.with(Material::grain)))  // as in a step of 1 s
+    if (Coulomb::keeps(scene.between(s.material_of(c.i), s.material_of(c.j))))  // as in a step of 1 s
       c.spring.delta_t = carry(1.0, g, slide(1.0, g, Motion<double>{moved, none, none}), c.spring.delta_t);
   }
   scene.box = times(factor, scene.box);

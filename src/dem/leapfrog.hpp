@@ -28,16 +28,17 @@ struct Mobility {
 };
 
 // A grain of a layer answers along z at most.
-MORAINE_HD Mobility mobility(const Scene& scene, double r, BodyId part_of) {
-  const double m = scene.inertial_mass(r);
-  if (part_of == BodyId::none) return {1 / m, 1 / m, scene.fall(r) * scene.down, 1 / (0.4 * m * r * r)};
+MORAINE_HD Mobility mobility(const Scene& scene, double r, Material material, BodyId part_of) {
+  const double m = scene.inertial_mass(r, material);
+  if (part_of == BodyId::none)
+    return {1 / m, 1 / m, scene.fall(r, material) * scene.down, 1 / (0.4 * m * r * r)};
   return {0, scene.is_rigid(part_of) ? 0 : 1 / m, {0, 0, 0}, 0};
 }
 // The same from a grain's row, which says by its inverse_inertia whether the grain is free.
-MORAINE_HD Mobility mobility(const Scene& scene, const GrainRow& g) {
+MORAINE_HD Mobility mobility(const Scene& scene, const GrainRow& g, Material material) {
   const bool free = g.inverse_inertia > 0;
-  return {free ? g.inverse_mass : 0, g.inverse_mass, free ? scene.fall(g.r) * scene.down : Vec3d{0, 0, 0},
-          g.inverse_inertia};
+  return {free ? g.inverse_mass : 0, g.inverse_mass,
+          free ? scene.fall(g.r, material) * scene.down : Vec3d{0, 0, 0}, g.inverse_inertia};
 }
 
 template <class Row>

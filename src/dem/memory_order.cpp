@@ -87,6 +87,7 @@ void sort_spatially(const Scene& scene, State& s) {
   };
   permute(s.id), permute(s.r), permute(s.x), permute(s.v), permute(s.omega), permute(s.rotation);
   permute(s.force), permute(s.torque), permute(s.x_start), permute(s.part_of);
+  if (!s.material.empty()) permute(s.material);
   for (Contact& c : s.contacts) {
     c.i = place[c.i], c.j = place[c.j];
     if (c.i > c.j) std::swap(c.i, c.j), turn_round(c.spring);

@@ -142,7 +142,8 @@ struct Rows {
   const BodyId* part_of;
   const std::int32_t *order, *first, *end;
   double margin;
-  std::array<bool, body_ids> rigid{};  // pairs of such grains are left out
+  std::array<bool, body_ids> rigid{};   // pairs of such grains are left out,
+  std::array<bool, body_ids> slides{};  // and those within one such body: see Scene::never_touch
   ContactOrder sum_order;
   std::int64_t* count;                // pass 1
   const std::int64_t* row = nullptr;  // pass 2
@@ -159,7 +160,8 @@ struct Rows {
         for (std::int32_t k = first[cell]; k < end[cell]; ++k) {
           const Index j = order[k];
           if (j == i) continue;
-          if (rigid[static_cast<int>(part_of[i])] && rigid[static_cast<int>(part_of[j])]) continue;
+          const auto of_i = static_cast<int>(part_of[i]), of_j = static_cast<int>(part_of[j]);
+          if ((rigid[of_i] && rigid[of_j]) || (of_i == of_j && slides[of_i])) continue;
           const Vec3d d = nearest_image(sides, a.x - grains[j].x);
           const double reach = a.r + grains[j].r + margin;
           if (dot(d, d) >= reach * reach) continue;
@@ -184,8 +186,9 @@ struct Neighbours {
   std::int64_t total = 0;
 
   // Throws Error if a coordinate is not finite.
+  // material: of each grain; null where all are of the first.
   void build(const Space& space, const Scene& scene, const GrainRow* grains, const BodyId* part_of, Index n,
-             double margin) {
+             double margin, const Material* material = nullptr) {
     const Cells cells = sort_into_cells(space, scene, grains, n, margin);
     count_.resize(n + 1), row.resize(n + 1);
     search::Rows rows{.levels = cells.levels,
@@ -195,9 +198,12 @@ struct Neighbours {
                       .first = cells.first,
                       .end = cells.end,
                       .margin = margin,
-                      .sum_order = {chunk_size(n)},
+                      .sum_order = {chunk_size(n), material},
                       .count = count_.data()};
-    for (int id = 0; id < body_ids; ++id) rows.rigid[id] = scene.is_rigid(static_cast<BodyId>(id));
+    for (int id = 0; id < body_ids; ++id) {
+      rows.rigid[id] = scene.is_rigid(static_cast<BodyId>(id));
+      rows.slides[id] = scene.slides_in_itself(static_cast<BodyId>(id));
+    }
     space.write(count_.data() + n, std::int64_t{0});
     space.for_each(n, rows);
     space.exclusive_scan(count_.data(), row.data(), n + 1);

@@ -25,7 +25,7 @@ Velocities at_step(const Scene& scene, const State& s) {
   Velocities w{s.v, s.omega};
   if (!s.staggered) return w;
   for (Index i = 0; i < s.size(); ++i) {
-    const Mobility m = mobility(scene, s.r[i], s.part_of[i]);
+    const Mobility m = mobility(scene, s.r[i], s.material_of(i), s.part_of[i]);
     w.v[i] = axpy(0.5 * scene.dt, m.acceleration(kick(scene, s, i)), s.v[i]);
     w.omega[i] = axpy(0.5 * scene.dt, m.spin_acceleration(s.torque[i]), s.omega[i]);
   }
@@ -41,8 +41,15 @@ Velocities at_step(const Scene& scene, const State& s) {
 
 // Whether contacts remember the force of their dampers at the state's step. Else it is worked out from the
 // velocities at the step, which the engine foresaw a little differently.
-bool dampers_are_known(const Scene& scene, const State& s, Material material) {
-  return s.staggered && scene.ledger && Restitution::used(scene.with(material));
+bool dampers_are_known(const Scene& scene, const State& s, const ContactParameters& p) {
+  return s.staggered && scene.ledger && Restitution::used(p);
+}
+
+const ContactParameters& between(const Scene& scene, const State& s, const Contact& c) {
+  return scene.between(s.material_of(c.i), s.material_of(c.j));
+}
+const ContactParameters& at_plane(const Scene& scene, const State& s, Index i, BodyId plane) {
+  return scene.between(s.material_of(i), scene.body(plane).material);
 }
 
 // Springs are left as they are, here and in for_each_contact. A plane that is gone bears nothing.
@@ -54,10 +61,11 @@ std::vector<WallForce> wall_forces(const Scene& scene, const State& s, const Vel
     if (!plane) continue;
     const GrainRow g = grain_at(s, w.i, at.v, at.omega);
     Spring<double> spring = w.spring;
+    const ContactParameters& law = at_plane(scene, s, w.i, w.wall);
     const Vec3d f =
-        dampers_are_known(scene, s, plane->material)
-            ? remembered_force<GeneralLaw>(scene.with(plane->material), plane->geometry(g.x, g.r), spring)
-            : plane_action<GeneralLaw, Account::none>(scene, 0, *plane, g, spring).f;
+        dampers_are_known(scene, s, law)
+            ? remembered_force<GeneralLaw>(law, plane->geometry(g.x, g.r), spring)
+            : plane_action<GeneralLaw, Account::none>(scene, 0, *plane, g, spring, s.material_of(w.i)).f;
     out.push_back({w.i, w.wall, std::abs(f[plane->axis]), f, plane->gap(g.x, g.r)});
   }
   return out;
@@ -68,16 +76,16 @@ template <class Use>
 void for_each_contact(const Scene& scene, const State& s, Use&& use) {
   const Sides sides = Sides::of(scene);
   const Velocities at = at_step(scene, s);
-  const bool known = dampers_are_known(scene, s, Material::grain);
   for (const Contact& c : s.contacts) {
     const Vec3d x_ij = nearest_image(sides, s.x[c.i] - s.x[c.j]);
     const Geometry<double> g = between_grains(x_ij, s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]);
     const Motion<double> motion{at.v[c.i] - at.v[c.j], at.omega[c.i], at.omega[c.j]};
     Spring<double> spring = c.spring;
-    const ContactParameters& law = scene.with(Material::grain);
+    const ContactParameters& law = between(scene, s, c);
     use(c, g,
-        known ? remembered_force<GeneralLaw>(law, g, spring)
-              : contact_law<GeneralLaw, Account::none>(law, 0, g, motion, spring).f);
+        dampers_are_known(scene, s, law)
+            ? remembered_force<GeneralLaw>(law, g, spring)
+            : contact_law<GeneralLaw, Account::none>(law, 0, g, motion, spring).f);
   }
 }
 
@@ -112,9 +120,10 @@ std::vector<ContactForce> contact_forces(const Scene& scene, const State& s) {
 
 void mark_slipping(const Scene& scene, State& s) {
   constexpr double rounding = 1e-12;  // of the force that slip leaves
-  const ContactParameters& p = scene.with(Material::grain);
   std::vector<double> slipping;
-  for_each_contact(scene, s, [&](const Contact&, const Geometry<double>& g, const Vec3d& f) {
+  for_each_contact(scene, s, [&](const Contact& c, const Geometry<double>& g, const Vec3d& f) {
+    const ContactParameters& p = between(scene, s, c);
+    if (SofteningCoulomb::keeps(p)) return slipping.push_back(c.spring.slipping);  // it knows
     Vec3d f_n = dot(f, g.n) * g.n;
     const Vec3d f_t = f - f_n;
     f_n -= GeneralLaw::more_normal(p, g, 0.0) * g.n;  // the limit does not see it
@@ -221,19 +230,21 @@ Observation observe(const Scene& scene, const State& s, const Loads& loads) {
     e.elastic_tangential += GeneralLaw::stored_tangential(p, g, spring);
   };
   for (const Contact& c : s.contacts)
-    store(scene.with(Material::grain),
+    store(between(scene, s, c),
           between_grains(nearest_image(sides, s.x[c.i] - s.x[c.j]), s.r[c.i] + s.r[c.j], s.r[c.i] - s.r[c.j]),
           s.v[c.i] - s.v[c.j], c.spring);
   const BodyMotion bodies = motion_of(scene, s);
   for (const WallContact& w : s.wall_contacts)
     if (const Plane* plane = bodies.find(w.wall))
-      store(scene.with(plane->material), plane->geometry(s.x[w.i], s.r[w.i]), s.v[w.i] - plane->v, w.spring);
+      store(at_plane(scene, s, w.i, w.wall), plane->geometry(s.x[w.i], s.r[w.i]), s.v[w.i] - plane->v,
+            w.spring);
 
   double net = 0;
   Index free = 0;
   for (Index i = 0; i < s.size(); ++i) {
-    const Mobility mob = mobility(scene, s.r[i], s.part_of[i]);
-    const double m = scene.inertial_mass(s.r[i]), inertia = 0.4 * m * s.r[i] * s.r[i];
+    const Material material = s.material_of(i);
+    const Mobility mob = mobility(scene, s.r[i], material, s.part_of[i]);
+    const double m = scene.inertial_mass(s.r[i], material), inertia = 0.4 * m * s.r[i] * s.r[i];
     // 1/2 m v(n-1/2).v(n+1/2)
     const auto before_times_after = [](const Vec3d& before, const Vec3d& at) {
       return dot(before, at + (at - before));
@@ -242,7 +253,8 @@ Observation observe(const Scene& scene, const State& s, const Loads& loads) {
     e.rotational += 0.5 * inertia * before_times_after(s.omega[i], at.omega[i]);
     if (s.part_of[i] != BodyId::none) continue;
     const double height = -(scene.down.x * s.x[i].x + scene.down.z * s.x[i].z);
-    e.potential += sphere_mass(scene.density, s.r[i]) * scene.submerged_gravity() * height;
+    e.potential +=
+        sphere_mass(scene.density_of(material), s.r[i]) * scene.submerged_gravity(material) * height;
     const Vec3d a =
         mob.acceleration(s.water_force.empty() ? loads.force[i] : loads.force[i] + s.water_force[i]);
     net += m * std::sqrt(dot(a, a));

@@ -53,6 +53,9 @@ void check_scene(const Scene& s, const State& state) {
   if (state.size() == 0) throw error("there are no grains");
   if (!(s.dt > 0)) throw error("time step = ", s.dt, " s: expected a positive number");
   check_bodies(s, state);
+  for (const Material m : state.material)
+    if (static_cast<int>(m) >= s.materials)
+      throw error("grains are of material ", static_cast<int>(m) + 1, ", and the scene has ", s.materials);
   const double r_max = *std::max_element(state.r.begin(), state.r.end());
   const Vec3d side = Sides::of(s).side;
   const double least = 4 * r_max + 2 * neighbour_margin(s, state);

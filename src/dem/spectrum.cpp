@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <map>
 
 #include "dem/body/motion.hpp"
 #include "dem/leapfrog.hpp"
@@ -35,8 +36,7 @@ Resistance springs(const ContactParameters& p, const Geometry<double>& g) {
 }
 Resistance dashpots(const ContactParameters& p, const Geometry<double>& g) {
   const auto at = patch<GeneralLaw>(p, g);
-  const double gamma_n =
-      p.zeta > 0 ? Restitution::gamma_n<GeneralLaw::Normal>(p, g, at.at()) : p.gamma_n;
+  const double gamma_n = p.zeta > 0 ? Restitution::gamma_n<GeneralLaw::Normal>(p, g, at.at()) : p.gamma_n;
   return {gamma_n, p.mu_s > 0 ? p.gamma_t : 0, 0, 0};
 }
 using ResistanceOf = Resistance (*)(const ContactParameters&, const Geometry<double>&);
@@ -45,15 +45,19 @@ using ResistanceOf = Resistance (*)(const ContactParameters&, const Geometry<dou
 class Network {
  public:
   Network(const Scene& scene, const State& s)
-      : scene_(scene), n_(s.size()), freedoms_(6 * s.size() + 2), part_of_(s.part_of), motion_(2 * s.size() + 1) {
+      : scene_(scene),
+        n_(s.size()),
+        freedoms_(6 * s.size() + 2),
+        part_of_(s.part_of),
+        motion_(2 * s.size() + 1) {
     const auto root = [](double inverse_mass) { return std::sqrt(inverse_mass); };
     double layer_mass = 0;
     for (Index i = 0; i < n_; ++i) {
-      const Mobility m = mobility(scene, s.r[i], s.part_of[i]);
+      const Mobility m = mobility(scene, s.r[i], s.material_of(i), s.part_of[i]);
       const double xy = root(m.inverse_mass_xy), spin = root(m.inverse_inertia);
       root_.push_back({xy, xy, root(m.inverse_mass_z)});
       root_.push_back({spin, spin, spin});
-      if (s.part_of[i] == BodyId::top_layer) layer_mass += scene.inertial_mass(s.r[i]);
+      if (s.part_of[i] == BodyId::top_layer) layer_mass += scene.inertial_mass(s.r[i], s.material_of(i));
     }
     const Body &wall = scene.body(BodyId::top_wall), &layer = scene.body(BodyId::top_layer);
     if (wall.z.kind == Drive::Kind::stress) wall_root_ = root(1 / wall.mass);
@@ -61,7 +65,7 @@ class Network {
 
     const Sides sides = Sides::of(scene);
     for (const Contact& c : s.contacts)
-      bonds_.push_back({c.i, c.j, Material::grain, false,
+      bonds_.push_back({c.i, c.j, pair_number(s.material_of(c.i), s.material_of(c.j)), false,
                         between_grains(nearest_image(sides, s.x[c.i] - s.x[c.j]), s.r[c.i] + s.r[c.j],
                                        s.r[c.i] - s.r[c.j])});
     for (const WallContact& w : s.wall_contacts) {
@@ -69,7 +73,8 @@ class Network {
       if (!plane.is_there()) continue;
       const Geometry<double> g =
           at_plane(s.x[w.i], s.r[w.i], plane.axis, place_of(scene, s, w.wall), plane.facing);
-      bonds_.push_back({w.i, w.wall == BodyId::top_wall ? n_ : -1, plane.material, true, g});
+      bonds_.push_back({w.i, w.wall == BodyId::top_wall ? n_ : -1,
+                        pair_number(s.material_of(w.i), plane.material), true, g});
     }
   }
 
@@ -88,7 +93,8 @@ class Network {
 
     std::vector<Vec3d>& load = load_;
     load.assign(motion_.size(), Vec3d{0, 0, 0});
-    for (const Bond& b : bonds_) resist(b, resistance(scene_.with(b.material), b.g), load);
+    for (const Bond& b : bonds_)
+      resist(b, resistance(scene_.contact[static_cast<std::size_t>(b.materials)], b.g), load);
 
     double layer_force = 0;
     for (Index i = 0; i < n_; ++i)
@@ -101,8 +107,8 @@ class Network {
 
  private:
   struct Bond {
-    Index i, j;  // j = n_: top wall, -1: a plane that stands still
-    Material material;
+    Index i, j;     // j = n_: top wall, -1: a plane that stands still
+    int materials;  // pair_number
     bool at_plane;
     Geometry<double> g;
   };
@@ -240,16 +246,32 @@ double critical_step(const Spectrum& s) {
 }
 
 double one_contact_step(const Scene& scene, const State& s) {
-  const double r = *std::min_element(s.r.begin(), s.r.end()), m = scene.inertial_mass(r);
-  const double inertia = 0.4 * m * r * r;
-  double step =
-      critical_step(scene.with(Material::grain), usual_contact(r, r), 2 / m, 2 / inertia, r);
-  for (const BodyId id : planes) {
-    const Body& plane = scene.body(id);
-    if (!plane.is_there()) continue;
-    const double inverse_mass = plane.along(plane.axis).kind == Drive::Kind::stress ? 1 / plane.mass : 0;
-    step = std::min(step, critical_step(scene.with(plane.material), usual_contact_at_plane(r),
-                                        1 / m + inverse_mass, 1 / inertia, r));
+  struct Grain {
+    double r, m;  // m, kg
+  };
+  std::map<Material, Grain> lightest;
+  for (Index i = 0; i < s.size(); ++i) {
+    const Grain grain{s.r[i], scene.inertial_mass(s.r[i], s.material_of(i))};
+    const auto [at, first] = lightest.emplace(s.material_of(i), grain);
+    if (grain.m < at->second.m || (grain.m == at->second.m && grain.r < at->second.r)) at->second = grain;
+  }
+  double step = std::numeric_limits<double>::infinity();
+  const auto take = [&](const ContactParameters& p, const Geometry<double>& g, double inverse_mass,
+                        double inverse_inertia, double arm) {
+    step = std::min(step, critical_step(p, g, inverse_mass, inverse_inertia, arm));
+  };
+  for (const auto& [of, a] : lightest) {
+    const double turning = 2.5 / (a.m * a.r * a.r);  // 1/I of a sphere
+    for (const auto& [other, b] : lightest)
+      take(scene.between(of, other), usual_contact(a.r, b.r), 1 / a.m + 1 / b.m,
+           turning + 2.5 / (b.m * b.r * b.r), std::max(a.r, b.r));
+    for (const BodyId id : planes) {
+      const Body& plane = scene.body(id);
+      if (!plane.is_there()) continue;
+      const double inverse_mass = plane.along(plane.axis).kind == Drive::Kind::stress ? 1 / plane.mass : 0;
+      take(scene.between(of, plane.material), usual_contact_at_plane(a.r), 1 / a.m + inverse_mass, turning,
+           a.r);
+    }
   }
   return step;
 }

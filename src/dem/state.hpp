@@ -56,6 +56,7 @@ struct State {
   std::vector<Vec3d> water_force;          // N, by pore water at the last exchange; empty where there is none
   std::vector<Vec3d> x_start;              // m, where the displacement is counted from
   std::vector<BodyId> part_of;             // what the grain is part of: none, or a layer
+  std::vector<Material> material;          // empty: all grains are of the first
   std::vector<Contact> contacts;           // overlapping pairs, sorted by (i, j)
   std::vector<WallContact> wall_contacts;  // sorted by (wall, i)
 
@@ -67,6 +68,7 @@ struct State {
   bool staggered = false;
 
   Index size() const { return static_cast<Index>(r.size()); }
+  Material material_of(Index i) const { return material.empty() ? Material::grain : material[i]; }
   const BodyState& at(BodyId id) const { return bodies[static_cast<std::size_t>(id)]; }
   BodyState& at(BodyId id) { return bodies[static_cast<std::size_t>(id)]; }
   double wall_z() const { return at(BodyId::top_wall).x.z; }  // m, height of the top wall

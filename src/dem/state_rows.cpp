@@ -1,5 +1,8 @@
 #include "dem/state_rows.hpp"
 
+#include <algorithm>
+#include <limits>
+
 #include "dem/memory_order.hpp"
 #include "dem/uses.hpp"
 
@@ -10,7 +13,7 @@ std::vector<GrainRow> grain_rows(const Scene& scene, const State& s) {
   for (Index i = 0; i < s.size(); ++i) {
     GrainRow& g = rows[i];
     const BodyId layer = s.part_of[i];
-    const Mobility m = mobility(scene, s.r[i], layer);
+    const Mobility m = mobility(scene, s.r[i], s.material_of(i), layer);
     g = {s.x[i], s.r[i], s.v[i], s.r[i], s.omega[i], m.inverse_mass_z, s.rotation[i], m.inverse_inertia};
     if (layer == BodyId::none) continue;
     const Drive& along_x = scene.body(layer).x;
@@ -21,6 +24,12 @@ std::vector<GrainRow> grain_rows(const Scene& scene, const State& s) {
     g.omega = {0, 0, 0};
   }
   return rows;
+}
+
+double least_mass(const Scene& scene, const State& s) {
+  double least = std::numeric_limits<double>::infinity();
+  for (Index i = 0; i < s.size(); ++i) least = std::min(least, scene.inertial_mass(s.r[i], s.material_of(i)));
+  return least;
 }
 
 Vec3d kick(const Scene& scene, const State& s, Index i) {
@@ -36,8 +45,8 @@ void start_half_a_step_back(const Scene& scene, const Reaction& reaction, const 
   bodies.ledger = {};
 }
 
-void half_step_back(const Scene& scene, GrainRow& g, const LoadRow& whole) {
-  const Mobility m = mobility(scene, g);
+void half_step_back(const Scene& scene, GrainRow& g, Material material, const LoadRow& whole) {
+  const Mobility m = mobility(scene, g, material);
   g.v = axpy(-0.5 * scene.dt, m.acceleration(whole.f), g.v);
   g.omega = axpy(-0.5 * scene.dt, m.spin_acceleration(whole.torque), g.omega);
 }
@@ -75,8 +84,7 @@ void append_grain(State& s, const GrainRow& g, const LoadRow& load, BodyId part_
   s.part_of.push_back(part_of);
 }
 
-Spring<double> remembered(const Scene& scene, Material material, Spring<double> s) {
-  const ContactParameters& p = scene.with(material);
+Spring<double> remembered(const Scene& scene, const ContactParameters& p, Spring<double> s) {
   MoreParts::for_each_memory([&]<class Part>() {
     const bool kept = Part::keeps(p) && (scene.ledger || !std::is_same_v<Part, ViscousWork>);
     if (!kept) static_cast<typename Part::template Memory<double>&>(s) = {};
@@ -87,13 +95,15 @@ Spring<double> remembered(const Scene& scene, Material material, Spring<double> 
 void append_contact(State& s, const Scene& scene, const Sides& sides, const GrainRow& a, const GrainRow& b,
                     Index i, Index j, const Spring<double>& spring) {
   if (!(between_grains(nearest_image(sides, a.x - b.x), a.r + b.r, a.r - b.r).delta_n < 0)) return;
-  s.contacts.push_back({i, j, remembered(scene, Material::grain, spring)});
+  const ContactParameters& p = scene.between(s.material_of(i), s.material_of(j));
+  s.contacts.push_back({i, j, remembered(scene, p, spring)});
 }
 
 void append_wall_contact(State& s, const Scene& scene, const Plane& plane, const GrainRow& g, Index i,
                          const Spring<double>& spring) {
   if (!(plane.gap(g.x, g.r) < 0)) return;
-  s.wall_contacts.push_back({i, plane.id, remembered(scene, plane.material, spring)});
+  const ContactParameters& p = scene.between(s.material_of(i), plane.material);
+  s.wall_contacts.push_back({i, plane.id, remembered(scene, p, spring)});
 }
 
 void finish_state(State& s, const BodyMotion& bodies) {
@@ -107,7 +117,7 @@ namespace {
 // Velocities and spins of grains by half a step dt, forwards or back, with the forces as they stand.
 void half_step(const Scene& scene, State& s, double dt) {
   for (Index i = 0; i < s.size(); ++i) {
-    const Mobility m = mobility(scene, s.r[i], s.part_of[i]);
+    const Mobility m = mobility(scene, s.r[i], s.material_of(i), s.part_of[i]);
     s.v[i] = axpy(0.5 * dt, m.acceleration(kick(scene, s, i)), s.v[i]);
     s.omega[i] = axpy(0.5 * dt, m.spin_acceleration(s.torque[i]), s.omega[i]);
   }

@@ -1,8 +1,9 @@
 // The order of every sum, in one place: what makes a result independent of threads, blocks and, in time,
 // ranks.
 //
-//   contacts of a grain   those within its chunk, those with later chunks, those with earlier ones, each by
-//   index a chunk               its groups of 32 grains one after the other, each added up by itself first
+//   contacts of a grain   those within its chunk, those with later chunks, those with earlier ones, chunk by
+//                         chunk; each by pair of materials, then by index
+//   a chunk               its groups of 32 grains one after the other, each added up by itself first
 //   the bed               its chunks one after the other
 //
 // Grains are dealt into chunks by memory order; how many depends on the number of grains alone. A pair
@@ -23,7 +24,8 @@ inline Index chunk_count(Index grains) { return (grains + chunk_size(grains) - 1
 
 // The order in which a grain adds up its contacts.
 struct ContactOrder {
-  Index chunk;  // grains in one, at most
+  Index chunk;                         // grains in one, at most
+  const Material* material = nullptr;  // of each grain; null where all are of the first
 
   MORAINE_HD Index chunk_of(Index i) const { return i / chunk; }
   MORAINE_HD Index begin_of(Index c) const { return c * chunk; }
@@ -32,7 +34,16 @@ struct ContactOrder {
   MORAINE_HD int rank(Index i, Index j) const { return chunk_of(i) == chunk_of(j) ? 0 : j > i ? 1 : 2; }
   MORAINE_HD bool before(Index i, Index a, Index b) const {
     const int ra = rank(i, a), rb = rank(i, b);
-    return ra != rb ? ra < rb : a < b;
+    if (ra != rb) return ra < rb;
+    if (!material) return a < b;
+    if (ra == 2 && chunk_of(a) != chunk_of(b)) return a < b;
+    const int pa = pair(i, a), pb = pair(i, b);
+    return pa != pb ? pa < pb : a < b;
+  }
+  // The pair of materials of two grains: that of the lower index comes first.
+  MORAINE_HD int pair(Index i, Index j) const {
+    if (!material) return 0;
+    return i < j ? pair_number(material[i], material[j]) : pair_number(material[j], material[i]);
   }
 };
 

@@ -16,6 +16,11 @@ struct LawUses {
   bool linear = false, hertz = false;
   bool couples = false;  // rolling or twisting
   bool operator==(const LawUses&) const = default;
+  LawUses& operator|=(const LawUses& also) {
+    friction |= also.friction, softening |= also.softening, damping |= also.damping;
+    restitution |= also.restitution, linear |= also.linear, hertz |= also.hertz, couples |= also.couples;
+    return *this;
+  }
 };
 struct Uses {
   LawUses grains, planes;
@@ -37,25 +42,48 @@ inline LawUses asked_by(const ContactParameters& p) {
           .hertz = p.E_star > 0,
           .couples = couples};
 }
+// use(parameters) of each pair of materials that grains of the scene may be of, and of each with walls.
+template <class Use>
+void for_each_pair_of_grains(const Scene& s, Use&& use) {
+  for (int i = 0; i < s.materials; ++i)
+    for (int j = 0; j < s.materials; ++j) use(s.between(static_cast<Material>(i), static_cast<Material>(j)));
+}
+template <class Use>
+void for_each_pair_with_walls(const Scene& s, Use&& use) {
+  for (int i = 0; i < s.materials; ++i) use(s.between(static_cast<Material>(i), Material::wall));
+}
 inline Uses asked_by(const Scene& s) {
-  return {asked_by(s.with(Material::grain)), s.has_planes() ? asked_by(s.with(Material::wall)) : LawUses{},
-          s.ledger, s.exchange_interval > 0};
+  Uses u;
+  u.ledger = s.ledger, u.water = s.exchange_interval > 0;
+  for_each_pair_of_grains(s, [&](const ContactParameters& p) { u.grains |= asked_by(p); });
+  if (s.has_planes())
+    for_each_pair_with_walls(s, [&](const ContactParameters& p) { u.planes |= asked_by(p); });
+  return u;
 }
 
 // Calls use.operator()<Row, account>() with the first row of CompiledLaws that has all the scene asks for.
 template <class Use>
 void with_laws(const Scene& s, Use&& use) {
   const Uses u = asked_by(s);
-  const auto covers = [&]<class L>(const LawUses& asked, Material with, L*) {
+  const auto covers = [&]<class L>(const LawUses& asked, L*) {
     return L::rubs >= asked.friction && L::softens >= asked.softening && L::damps >= asked.damping &&
            L::restitutes >= asked.restitution && L::linear >= asked.linear && L::hertz >= asked.hertz &&
-           L::couples >= asked.couples && MoreParts::covered_by<L>(s.with(with));
+           L::couples >= asked.couples;
+  };
+  const auto covers_parts = [&]<class Grains, class Planes>(Grains*, Planes*) {
+    bool all = true;
+    for_each_pair_of_grains(s, [&](const ContactParameters& p) { all &= MoreParts::covered_by<Grains>(p); });
+    if (s.has_planes())
+      for_each_pair_with_walls(s,
+                               [&](const ContactParameters& p) { all &= MoreParts::covered_by<Planes>(p); });
+    return all;
   };
   const auto try_row = [&]<class Row>(Row*) {
     using Grains = typename Row::BetweenGrains;
     using Planes = typename Row::AtPlanes;
-    if (!covers(u.grains, Material::grain, static_cast<Grains*>(nullptr)) ||
-        !covers(u.planes, Material::wall, static_cast<Planes*>(nullptr)))
+    if (!covers(u.grains, static_cast<Grains*>(nullptr)) ||
+        !covers(u.planes, static_cast<Planes*>(nullptr)) ||
+        !covers_parts(static_cast<Grains*>(nullptr), static_cast<Planes*>(nullptr)))
       return false;
     if (u.ledger)
       use.template operator()<Row, Account::energy>();

@@ -59,6 +59,7 @@ constexpr std::tuple members<dem::Scene>{
     Member{"periodic_z", &dem::Scene::periodic_z},
     Member{"gravity", &dem::Scene::gravity},
     Member{"down", &dem::Scene::down},
+    Member{"materials", &dem::Scene::materials},
     Member{"density", &dem::Scene::density},
     Member{"least_inertia", &dem::Scene::least_inertia},
     Member{"fluid_density", &dem::Scene::fluid_density},
@@ -121,6 +122,7 @@ constexpr std::tuple members<dem::State>{
     Member{"water_force", &dem::State::water_force},
     Member{"x_start", &dem::State::x_start},
     Member{"part_of", &dem::State::part_of},
+    Member{"material", &dem::State::material},
     Member{"contacts", &dem::State::contacts},
     Member{"wall_contacts", &dem::State::wall_contacts},
     Member{"bodies", &dem::State::bodies},
@@ -219,6 +221,7 @@ template <>
 constexpr std::tuple members<Checkpoint>{
     Member{"case_text", &Checkpoint::case_text},
     Member{"version", &Checkpoint::version},
+    Member{"materials", &Checkpoint::materials},
     Member{"inputs", &Checkpoint::inputs},
     Member{"stage", &Checkpoint::stage},
     Member{"start", &Checkpoint::start},
@@ -432,6 +435,8 @@ void get(const hdf5::Group& group, const char* name, T& value) {
 
 // A file can be sound and its content still not be a scene, or a state.
 void validate(const std::string& file, const dem::Scene& scene) {
+  if (scene.materials < 1 || scene.materials > dem::grain_materials)
+    throw error(file, ": /scene: materials is ", scene.materials, ", none of 1 to ", dem::grain_materials);
   for (int k = 0; k < dem::body_ids; ++k) {
     using Shape = dem::Body::Shape;
     const auto id = static_cast<dem::BodyId>(k);
@@ -453,7 +458,8 @@ void validate(const std::string& file, const dem::State& state) {
     using List = std::decay_t<decltype(state.*pointer)>;
     if constexpr (is_list<List>) {
       const std::size_t size = (state.*pointer).size();
-      const bool may_be_empty = std::string_view(name) == "water_force";
+      const bool may_be_empty =
+          std::string_view(name) == "water_force" || std::string_view(name) == "material";
       if (!is_stored_struct<typename List::value_type> && size != n && !(may_be_empty && size == 0))
         fail(name, " has ", size, " rows, r has ", n);
     }
@@ -502,6 +508,10 @@ void validate(const std::string& file, const Checkpoint& c) {
   for (const auto* sides : {&c.water_settings.sides.low, &c.water_settings.sides.high})
     for (const fluid::Side& side : *sides) validate(file, c, "water", side.history);
   validate(file, c.state);
+  for (const dem::Material m : c.state.material)
+    if (static_cast<int>(m) >= c.scene.materials)
+      throw error(file, ": /state: no grain can be of material ", static_cast<int>(m), " among ",
+                  c.scene.materials);
   const coupling::WaterState& w = c.water;
   const std::size_t n = c.state.r.size();
   const auto fail = [&](const auto&... parts) { throw error(file, ": /water: ", parts...); };

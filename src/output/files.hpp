@@ -114,12 +114,13 @@ struct Snapshot {
   dem::Vec3d box;   // m
   double top_wall;  // m; 0: none
   std::vector<dem::BodyId> role;
-  std::vector<double> r;             // m
-  std::vector<dem::Vec3d> x, v;      // m, in the box; m/s
-  std::vector<dem::Vec3d> omega;     // rad/s, half a step earlier
-  std::vector<dem::Vec3d> rotation;  // rad
-  std::vector<dem::Index> i, j;      // of contacts, i < j
-  std::vector<dem::Vec3d> f_t;       // N, on i
+  std::vector<dem::Material> material;  // empty: all grains are of the first
+  std::vector<double> r;                // m
+  std::vector<dem::Vec3d> x, v;         // m, in the box; m/s
+  std::vector<dem::Vec3d> omega;        // rad/s, half a step earlier
+  std::vector<dem::Vec3d> rotation;     // rad
+  std::vector<dem::Index> i, j;         // of contacts, i < j
+  std::vector<dem::Vec3d> f_t;          // N, on i
 };
 bool is_snapshot(const std::filesystem::path& path);  // as its first lines say
 // Throws Error as read_checkpoint does.
@@ -133,6 +134,7 @@ void write_xdmf(const std::filesystem::path& directory, const std::vector<Snapsh
 struct Checkpoint {
   std::string case_text;  // resolved case
   std::string version;
+  std::string materials;   // of the grains, by number: "quartz, clay"; empty: one without a name
   std::string inputs;      // files besides the case, with their digests
   std::int64_t stage = 0;  // index
   StageStart start;        // of the stage

@@ -24,6 +24,7 @@ void validate(const hdf5::Group& grains, const hdf5::Group& contacts, const Snap
   for (const dem::BodyId role : s.role)
     if (role != dem::BodyId::none && dem::shape_of(role) != dem::Body::Shape::layer)
       throw error(grains.where("role"), ": no grain can be part of ", dem::name_of(role));
+  if (!s.material.empty()) expect_rows(grains, n, s.material);
   for (std::size_t k = 0; k < s.i.size(); ++k)
     if (s.i[k] < 0 || s.i[k] >= s.j[k] || static_cast<std::size_t>(s.j[k]) >= n)
       throw error(contacts.where(), ": no contact can be between grains ", s.i[k], " and ", s.j[k], " of ",
@@ -47,6 +48,7 @@ Snapshot read_snapshot(const std::filesystem::path& path) {
   file.get("top_wall", s.top_wall);
   const hdf5::Group grains = file.open_group("grains"), contacts = file.open_group("contacts");
   grains.read("role", s.role);
+  if (grains.holds("material")) grains.read("material", s.material);
   grains.read("radius", s.r);
   grains.read("position", s.x);
   grains.read("velocity", s.v);

@@ -53,6 +53,7 @@ void write_grains(const hdf5::Group& grains, const dem::Scene& scene, const dem:
 
   grains.write("id", arrange(state.id, rows), "1");
   grains.write("role", arrange(state.part_of, rows), "1");
+  if (!state.material.empty()) grains.write("material", arrange(state.material, rows), "1");
   grains.write("radius", arrange(state.r, rows), "m");
   grains.write("position", arrange(state.x, rows, [&](const Vec3d& x) { return wrap(scene, x); }), "m");
   grains.write("displacement", arrange(displacement, rows), "m");

@@ -91,9 +91,11 @@ void print_mixture(const cases::Grains& g, const dem::State& s, double volume) {
 
 // Pa, mean of the grains' own weight.
 double weight_above(const dem::Scene& scene, const dem::State& s) {
-  double volume = 0;
-  for (const double r : s.r) volume += dem::sphere_volume(r);
-  return 0.5 * scene.density * volume * scene.submerged_gravity() / scene.area();
+  double weight = 0;
+  for (dem::Index i = 0; i < s.size(); ++i)
+    weight += dem::sphere_mass(scene.density_of(s.material_of(i)), s.r[i]) *
+              scene.submerged_gravity(s.material_of(i));
+  return 0.5 * weight / scene.area();
 }
 
 constexpr double long_run = 7 * 86400, short_step = 1e-9, a_day = 86400;  // s
@@ -156,9 +158,9 @@ void check_case(const Options& options) {
   double inertial_density = c.grains.density;
   if (c.density_scaling > 0.5 * sizes.smallest) {
     dem::Scene scaled;
-    scaled.density = c.grains.density, scaled.least_inertia = c.density_scaling;
+    scaled.density.fill(c.grains.density), scaled.least_inertia = c.density_scaling;
     double mass = 0;
-    for (const double r : state.r) mass += scaled.inertial_mass(r);
+    for (const double r : state.r) mass += scaled.inertial_mass(r, dem::Material::grain);
     inertial_density = mass / volume;
     std::printf(
         "  scaling       radii below %.4g m have its inertia: the bed's is %.3g times its own, and the step "
@@ -228,9 +230,8 @@ void check_case(const Options& options) {
     const double pressure = std::max(wanted.normal_stress, wanted.pressure);
     if (pressure > 0) {
       const double r = 0.5 * diameter, k_n = dem::as_linear(c.contact, r, pressure).k_n;
-      std::printf(
-          "    stiffness   k_n/(sigma_0 d) = %.3g%s\n", k_n / (pressure * diameter),
-          k_n / (pressure * diameter) < 1e4 ? "  (below 1e4: softer than rigid grains)" : "");
+      std::printf("    stiffness   k_n/(sigma_0 d) = %.3g%s\n", k_n / (pressure * diameter),
+                  k_n / (pressure * diameter) < 1e4 ? "  (below 1e4: softer than rigid grains)" : "");
       if (strain_rate != 0) {
         const double inertia = std::abs(strain_rate) * r * std::sqrt(inertial_density / pressure);
         std::printf("    inertia     I = %.3g (eq. 1)%s\n", inertia,

@@ -105,9 +105,9 @@ void Estimate::pack() {
   const std::vector<double>& r = start_.before.state.r;
   dem::Scene scene;
   scene.box = {start_.box_x, start_.box_y, 0};
-  scene.density = case_.grains.density, scene.gravity = 0, scene.ledger = false;
-  const double mass = scene.inertial_mass(*std::min_element(r.begin(), r.end()));
+  scene.density.fill(case_.grains.density), scene.gravity = 0, scene.ledger = false;
   const double r_min = *std::min_element(r.begin(), r.end());
+  const double mass = scene.inertial_mass(r_min, dem::Material::grain);
   const double k_n = dem::stiffness_of(case_.contact, dem::usual_contact(r_min, r_min));
   scene.dt = 0.15 * std::sqrt(mass / k_n);
   dem::ContactParameters smooth;

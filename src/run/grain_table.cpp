@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "case/csv.hpp"
+#include "case/materials.hpp"
 #include "dem/engine.hpp"
 #include "dem/packing.hpp"
 #include "dem/periodic_sides.hpp"
@@ -53,13 +54,34 @@ std::vector<dem::BodyId> roles_in(const cases::CsvTable& table) {
   return roles;
 }
 
-void write_csv(std::ostream& out, const dem::State& s) {
+std::vector<dem::Material> materials_in(const cases::Case& c, const cases::CsvTable& table) {
+  std::vector<dem::Material> materials;
+  if (!table.has("material")) return materials;
+  const std::vector<std::string> known = cases::material_names(c);
+  for (const std::string& word : table.words("material")) {
+    const int number = cases::material_number(c, word);
+    if (number < 0) {
+      const std::string near = cases::nearest(word, known);
+      throw error(table.at(materials.size()), ": material = \"", word, "\": ",
+                  known.empty()  ? "the case has no [[material]]"
+                  : near.empty() ? "known: " + cases::join(known, ", ")
+                                 : "did you mean " + near + "?");
+    }
+    materials.push_back(dem::Material(number));
+  }
+  return materials;
+}
+
+// names: of the materials.
+void write_csv(std::ostream& out, const dem::State& s, const std::vector<std::string>& names) {
   const bool layers = std::ranges::count(s.part_of, dem::BodyId::none) < s.size();
-  out << "# m, m/s, rad/s\nid, x, y, z, r, vx, vy, vz, wx, wy, wz" << (layers ? ", role\n" : "\n");
+  out << "# m, m/s, rad/s\nid, x, y, z, r, vx, vy, vz, wx, wy, wz" << (layers ? ", role" : "")
+      << (s.material.empty() ? "\n" : ", material\n");
   for (dem::Index i = 0; i < s.size(); ++i) {
     const dem::Vec3d &x = s.x[i], &w = s.omega[i];
     add(out, {double(s.id[i]), x.x, x.y, x.z, s.r[i], s.v[i].x, s.v[i].y, s.v[i].z, w.x, w.y, w.z}, ", ",
-        layers ? text(", ", role_name(s.part_of[i])) : "");
+        text(layers ? ", " : "", layers ? role_name(s.part_of[i]) : "", s.material.empty() ? "" : ", ",
+             s.material.empty() ? "" : names.at(static_cast<std::size_t>(s.material[i]))));
   }
 }
 
@@ -69,15 +91,17 @@ void write_lammps(std::ostream& out, const dem::Scene& scene, const dem::State& 
     for (dem::Index i = 0; i < s.size(); ++i)
       if (dem::Sides::of(scene).side[a] == 0)
         low[a] = std::min(low[a], s.x[i][a] - s.r[i]), high[a] = std::max(high[a], s.x[i][a] + s.r[i]);
-  out << "# atom_style sphere, SI units\n\n" << s.size() << " atoms\n1 atom types\n\n";
+  out << "# atom_style sphere, SI units\n\n"
+      << s.size() << " atoms\n"
+      << scene.materials << " atom types\n\n";
   for (int a = 0; a < 3; ++a)
     out << digits(low[a]) << " " << digits(high[a]) << " "
         << "xyz"[a] << "lo "
         << "xyz"[a] << "hi\n";
   out << "\nAtoms # sphere\n\n";
   for (dem::Index i = 0; i < s.size(); ++i) {
-    out << s.id[i] + 1 << " 1 ";
-    add(out, {2 * s.r[i], scene.density, s.x[i].x, s.x[i].y, s.x[i].z}, " ");
+    out << s.id[i] + 1 << " " << static_cast<int>(s.material_of(i)) + 1 << " ";
+    add(out, {2 * s.r[i], scene.density_of(s.material_of(i)), s.x[i].x, s.x[i].y, s.x[i].z}, " ");
   }
   out << "\nVelocities\n\n";
   for (dem::Index i = 0; i < s.size(); ++i) {
@@ -94,6 +118,10 @@ void write_vtk(std::ostream& out, const dem::State& s) {
   for (dem::Index i = 0; i < s.size(); ++i) out << "1 " << i << "\n";
   out << "POINT_DATA " << s.size() << "\nSCALARS radius double 1\nLOOKUP_TABLE default\n";
   for (const double r : s.r) out << digits(r) << "\n";
+  if (!s.material.empty()) {
+    out << "SCALARS material int 1\nLOOKUP_TABLE default\n";
+    for (const dem::Material m : s.material) out << static_cast<int>(m) << "\n";
+  }
   out << "VECTORS velocity double\n";
   for (const dem::Vec3d& u : s.v) add(out, {u.x, u.y, u.z}, " ");
   out << "VECTORS spin double\n";
@@ -105,8 +133,8 @@ void write_vtk(std::ostream& out, const dem::State& s) {
 bool is_grain_table(const fs::path& start) { return start.extension() == ".csv"; }
 
 OwnGrains read_grain_table(const cases::Case& c) {
-  const cases::CsvTable table(c.start, {"role"});
-  table.expect_only({"id", "x", "y", "z", "r", "vx", "vy", "vz", "wx", "wy", "wz", "role"});
+  const cases::CsvTable table(c.start, {"role", "material"});
+  table.expect_only({"id", "x", "y", "z", "r", "vx", "vy", "vz", "wx", "wy", "wz", "role", "material"});
   for (int a = 0; a < 2; ++a)
     if (!((a == 0 ? c.box_x : c.box_y) > 0))
       throw error(c.start.string(), ": a table of grains has no box; expected box.", "xy"[a],
@@ -130,6 +158,7 @@ OwnGrains read_grain_table(const cases::Case& c) {
     }
   };
   vector(velocities, "m/s", s.v), vector(spins, "rad/s", s.omega);
+  s.material = materials_in(c, table);
   OwnGrains own{c.start, std::move(s), {}, c.box_x, c.box_y, c.box_z, roles_in(table)};
   for (std::size_t row = 0; row < table.rows(); ++row) own.lines.push_back(table.line(row));
   return own;
@@ -149,9 +178,10 @@ void export_grains(const fs::path& case_directory, const std::string& format, co
   for (const dem::Index i : order) {
     s.id.push_back(c.state.id[i]), s.r.push_back(c.state.r[i]), s.x.push_back(c.state.x[i]);
     s.omega.push_back(c.state.omega[i]), s.part_of.push_back(c.state.part_of[i]), s.v.push_back(c.state.v[i]);
+    if (!c.state.material.empty()) s.material.push_back(c.state.material[i]);
   }
   std::ostringstream text;
-  if (format == "csv") write_csv(text, s);
+  if (format == "csv") write_csv(text, s, cases::split(c.materials, ", "));
   if (format == "lammps") write_lammps(text, c.scene, s);
   if (format == "vtk") write_vtk(text, s);
   if (file.empty()) {

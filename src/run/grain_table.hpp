@@ -11,9 +11,9 @@ namespace moraine::run {
 // Whether `start` names a table rather than a case or a checkpoint: NAME.csv.
 bool is_grain_table(const std::filesystem::path& start);
 
-// Columns x, y, z, r (m; centre and radius), and if wanted vx, vy, vz (m/s), wx, wy, wz (rad/s) and role
-// (free, bottom_layer or top_layer). The box is that of the case. Throws Error with the line of the file
-// where a value is wrong.
+// Columns x, y, z, r (m; centre and radius), and if wanted vx, vy, vz (m/s), wx, wy, wz (rad/s) role
+// (free, bottom_layer or top_layer) and material (its name). The box is that of the case. Throws Error with
+// the line of the file where a value is wrong.
 OwnGrains read_grain_table(const cases::Case& c);
 
 // Where a case has come to: `format` csv (as above, with ids, and roles where there are layers), lammps (a

@@ -53,7 +53,7 @@ dem::Index most_energetic(const dem::Scene& scene, const dem::State& s) {
   dem::Index most = 0;
   double most_energy = -1;
   for (dem::Index i = 0; i < s.size(); ++i) {
-    const double m = scene.inertial_mass(s.r[i]);
+    const double m = scene.inertial_mass(s.r[i], s.material_of(i));
     const double e = 0.5 * m * (dot(s.v[i], s.v[i]) + 0.4 * s.r[i] * s.r[i] * dot(s.omega[i], s.omega[i]));
     if (e > most_energy) most = i, most_energy = e;
   }

@@ -219,6 +219,19 @@ bool is_lammps_data(const std::filesystem::path& start) {
   return false;
 }
 
+// The material of a type, in the order of the case; without materials types do not count.
+static dem::Material type_of(const cases::Case& c, const DataFile& data, const Row& row) {
+  if (c.materials.size() < 2) return dem::Material::grain;
+  const double type = data.number(row, 1, "type");
+  if (!(type >= 1 && type <= static_cast<double>(c.materials.size())))
+    throw data.wrong(row.line, "type = ", row.words[1], ", and the case has ", c.materials.size(),
+                     " materials");
+  return dem::Material(static_cast<int>(type) - 1);
+}
+static double density_of(const cases::Case& c, dem::Material m) {
+  return c.materials.empty() ? c.grains.density : c.materials[static_cast<std::size_t>(m)].of.at("density");
+}
+
 OwnGrains read_lammps_data(const cases::Case& c) {
   const DataFile data(c.start);
   if (data.atoms.line == 0) throw error(data.file(), ": there is no section Atoms");
@@ -227,16 +240,20 @@ OwnGrains read_lammps_data(const cases::Case& c) {
     const Row* row;
     double r;
     dem::Vec3d x, v, omega;
+    dem::Material material;
   };
   std::map<std::int64_t, Grain> grains;
   for (const Row& row : data.rows_of("Atoms", data.atoms,
                                      "7: id type diameter density x y z, or 10 with image flags", {7, 10})) {
     const double diameter = data.number(row, 2, "diameter"), density = data.number(row, 3, "density");
     if (!(diameter > 0)) throw data.wrong(row.line, "diameter = ", diameter, " m; expected more than 0");
-    if (!(std::abs(density - c.grains.density) <= same * c.grains.density))
-      throw data.wrong(row.line, "density = ", density, " kg/m3, and grains.density = ", c.grains.density,
+    const dem::Material material = type_of(c, data, row);
+    const double of_case = density_of(c, material);
+    if (!(std::abs(density - of_case) <= same * of_case))
+      throw data.wrong(row.line, "density = ", density, " kg/m3, and ",
+                       c.materials.empty() ? "grains.density" : "that of its material", " = ", of_case,
                        " kg/m3; expected that of the case for all grains");
-    Grain grain{&row, diameter / 2, {}, {}, {}};
+    Grain grain{&row, diameter / 2, {}, {}, {}, material};
     for (int a = 0; a < 3; ++a) {
       const char* const names[] = {"x", "y", "z"};
       grain.x[a] = data.number(row, 4 + a, names[a]) - box.low[a];
@@ -268,6 +285,7 @@ OwnGrains read_lammps_data(const cases::Case& c) {
   dem::Index i = 0;
   for (const auto& [id, grain] : grains) {
     own.state.v[i] = grain.v, own.state.omega[i++] = grain.omega;
+    if (c.materials.size() > 1) own.state.material.push_back(grain.material);
     own.lines.push_back(grain.row->line);
   }
   return own;

@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "dem/scene_check.hpp"
+#include "dem/state_rows.hpp"
+#include "dem/uses.hpp"
 #include "error.hpp"
 #include "memory.hpp"
 #include "output/files.hpp"
@@ -33,13 +35,17 @@ dem::ContactParameters as_springs(dem::ContactParameters p, bool wall, double r)
   return p;
 }
 
-// Of the smallest grain, radius r.
+// Of the lightest grain, whose radius is r; with several materials, as if it touched any of them.
 std::vector<Mode> modes_of(const Stage& stage, const dem::State& s, double r) {
   const dem::Scene& scene = stage.scene;
-  const double w = 1 / scene.inertial_mass(r);
+  const double w = 1 / dem::least_mass(scene, s);
   const auto sticks = [](const dem::ContactParameters& p, double value) { return p.mu_s > 0 ? value : 0; };
   std::vector<Mode> modes;
+  std::vector<dem::ContactParameters> of_grains, of_walls;  // told so far
   const auto add = [&](const dem::ContactParameters& law, bool wall, double bodies) {
+    for (const dem::ContactParameters& before : wall ? of_walls : of_grains)
+      if (before == law) return;
+    (wall ? of_walls : of_grains).push_back(law);
     const dem::ContactParameters p = as_springs(law, wall, r);
     modes.push_back({wall ? "along the normal of a wall" : "along the normal of two grains",
                      wall ? "wall_gamma_n" : "gamma_n", p.k_n, p.gamma_n, bodies * w, true});
@@ -47,9 +53,14 @@ std::vector<Mode> modes_of(const Stage& stage, const dem::State& s, double r) {
                      wall ? "wall_gamma_t" : "gamma_t", sticks(p, p.k_t), sticks(p, p.gamma_t),
                      3.5 * bodies * w, true});
   };
-  if (s.size() > 1) add(scene.with(dem::Material::grain), false, 2);
-  const dem::ContactParameters at_walls = as_springs(scene.with(dem::Material::wall), true, r);
-  if (scene.has_planes()) add(scene.with(dem::Material::wall), true, 1);
+  if (s.size() > 1)
+    dem::for_each_pair_of_grains(scene, [&](const dem::ContactParameters& p) { add(p, false, 2); });
+  dem::ContactParameters at_walls = as_springs(scene.with(dem::Material::wall), true, r);  // the stiffest
+  dem::for_each_pair_with_walls(scene, [&](const dem::ContactParameters& law) {
+    if (scene.has_planes()) add(law, true, 1);
+    const dem::ContactParameters p = as_springs(law, true, r);
+    at_walls.k_n = std::max(at_walls.k_n, p.k_n), at_walls.gamma_n = std::max(at_walls.gamma_n, p.gamma_n);
+  });
   const dem::Body& top_wall = scene.body(dem::BodyId::top_wall);
   if (top_wall.z.kind == dem::Drive::Kind::stress) {
     const double layer = std::round(

@@ -9,6 +9,8 @@
 #include <iostream>
 #include <set>
 
+#include "case/keys.hpp"
+#include "case/materials.hpp"
 #include "error.hpp"
 #include "memory.hpp"
 #include "output/files.hpp"
@@ -168,6 +170,7 @@ class Runner {
   void run_stages(bool resuming) {
     if (!resuming) now_ = start_.before;
     now_.case_text = case_.resolved, now_.inputs = start_.inputs;
+    now_.materials = cases::join(cases::material_names(case_), ", ");
     if (resuming) remove_later_snapshots(), all_listed_ = false;  // lists lag behind the snapshots
     now_.version = MORAINE_VERSION;
     const std::string header = "# moraine " MORAINE_VERSION ", " + engine_->describe() + ", seed " +

@@ -26,7 +26,7 @@ OwnGrains read_snapshot_grains(const cases::Case& c) {
                 side(c.box_z, snapshot.box.z)};
   dem::State& s = own.state;
   s.v = std::move(snapshot.v), s.omega = std::move(snapshot.omega);
-  s.rotation = std::move(snapshot.rotation);
+  s.rotation = std::move(snapshot.rotation), s.material = std::move(snapshot.material);
   s.wall_z() = snapshot.top_wall;
   own.roles = std::move(snapshot.role);
   dem::Scene box;

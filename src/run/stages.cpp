@@ -4,12 +4,16 @@
 #include <cmath>
 
 #include "case/csv.hpp"
+#include "case/materials.hpp"
 #include "dem/engine.hpp"
 #include "dem/memory_order.hpp"
 #include "dem/observe.hpp"
 #include "dem/packing.hpp"
+#include "dem/state_rows.hpp"
+#include "dem/uses.hpp"
 #include "error.hpp"
 #include "output/sealed.hpp"
+#include "run/material_of_grains.hpp"
 #include "run/needs.hpp"
 #include "run/own_grains.hpp"
 #include "run/press.hpp"
@@ -57,7 +61,7 @@ dem::Scene scene_of(const cases::Case& c, const cases::Stage& stage, const Start
   dem::Scene scene;
   scene.box = box;
   scene.periodic_x = c.periodic_x, scene.periodic_y = c.periodic_y, scene.periodic_z = c.periodic_z;
-  scene.gravity = c.gravity, scene.density = c.grains.density;
+  scene.gravity = c.gravity, scene.density.fill(c.grains.density);
   if (c.slope != 0) scene.down = {std::sin(c.slope), 0, -std::cos(c.slope)};
   scene.least_inertia = c.density_scaling;
   dem::ContactParameters &grain = scene.with(dem::Material::grain), &wall = scene.with(dem::Material::wall);
@@ -68,8 +72,9 @@ dem::Scene scene_of(const cases::Case& c, const cases::Stage& stage, const Start
   grain.zeta = dem::damping_ratio(stage.restitution);
   wall.zeta = dem::damping_ratio(stage.wall_restitution);
   for (dem::ContactParameters& p : scene.contact)
-    p.density_i = p.density_j = scene.density, p.least_inertia = scene.least_inertia;
+    p.density_i = p.density_j = c.grains.density, p.least_inertia = scene.least_inertia;
   wall.mu_s = wall.mu_d = stage.wall_mu;
+  cases::set_materials(c, stage, scene);
   scene.neighbour_margin = c.neighbour_margin, scene.ledger = c.ledger;
   scene.fluid_density = stage.fluid ? c.fluid.density : 0;
   if (!c.floor) scene.body(BodyId::floor) = {};
@@ -148,16 +153,18 @@ double sauter_diameter(const dem::State& s) {
 // dt = f sqrt(min m / max k), eq. 9; the walls count among the k. Of Hertz and Mindlin those at the usual
 // overlap.
 double step_by_eq_9(const dem::Scene& scene, const dem::State& s, double f) {
-  const double r = *std::min_element(s.r.begin(), s.r.end()), m = scene.inertial_mass(r);
+  const double r = *std::min_element(s.r.begin(), s.r.end());
   double k = 0;
   const auto take = [&](const dem::ContactParameters& p, const dem::Geometry<double>& g) {
     k = std::max({k, dem::stiffness_of(p, g), dem::tangential_stiffness_of(p, g)});
     if (dem::Rolling::used(p)) k = std::max(k, p.k_roll);
     if (dem::Twisting::used(p)) k = std::max(k, p.k_twist);
   };
-  take(scene.with(dem::Material::grain), dem::usual_contact(r, r));
-  take(scene.with(dem::Material::wall), dem::usual_contact_at_plane(r));
-  return f * std::sqrt(m / k);
+  dem::for_each_pair_of_grains(scene,
+                               [&](const dem::ContactParameters& p) { take(p, dem::usual_contact(r, r)); });
+  dem::for_each_pair_with_walls(
+      scene, [&](const dem::ContactParameters& p) { take(p, dem::usual_contact_at_plane(r)); });
+  return f * std::sqrt(dem::least_mass(scene, s) / k);
 }
 
 static double step_of(const cases::Case& c, const cases::Stage& stage, const dem::Scene& scene,
@@ -179,9 +186,24 @@ static std::vector<dem::Sieve> sieves_in(const std::filesystem::path& file) {
   return sieves;
 }
 
+// Springs of a snapshot, which were found from its forces with contact.k_t (or contact.young).
+static void springs_of_pairs(const cases::Case& c, dem::State& s) {
+  if (s.material.empty()) return;
+  dem::Scene scene;
+  scene.with(dem::Material::grain) = c.contact;
+  cases::set_materials(c, c.stages.at(0), scene);
+  const auto firmness = [](const dem::ContactParameters& p) { return p.k_t + p.G_star; };  // one of both
+  for (dem::Contact& contact : s.contacts) {
+    const double of_pair = firmness(scene.between(s.material_of(contact.i), s.material_of(contact.j)));
+    contact.spring.delta_t = (of_pair > 0 ? firmness(c.contact) / of_pair : 0) * contact.spring.delta_t;
+  }
+}
+
 static Start grains_of(const cases::Case& c) {
   if (has_own_grains(c.start)) {
     OwnGrains own = read_own_grains(c);
+    take_materials(c, own.state, [&](dem::Index i) { return own.at(i); });
+    if (output::is_snapshot(c.start)) springs_of_pairs(c, own.state);
     Start s{{}, own.box_x, own.box_y, own.box_z, 0};
     s.before.state = std::move(own.state), s.roles = std::move(own.roles), s.note = std::move(own.note);
     double volume = 0;
@@ -197,6 +219,8 @@ static Start grains_of(const cases::Case& c) {
     if (s.before.state.r.empty()) throw error(c.start.string(), ": has no grains");
     s.before.rows.clear(), s.before.snapshots.clear();
     s.before.stage = 0, s.before.start.time = 0, s.before.finished = false;
+    take_materials(c, s.before.state, s.before.scene, s.before.materials,
+                   [&](dem::Index i) { return text(c.start.string(), ": grain ", s.before.state.id[i]); });
     const dem::Scene& scene = s.before.scene;
     expect_same_sides(c, scene.box, {scene.periodic_x, scene.periodic_y, scene.periodic_z});
     if (s.box_x <= 0) s.box_x = scene.box.x;
@@ -235,6 +259,7 @@ static Start grains_of(const cases::Case& c) {
           loose.box_z > 0 ? loose.box_z : c.box_z,
           default_wall_mass(c, loose.state.size(), loose.cell)};
   s.before.state = std::move(loose.state);
+  take_materials(c, s.before.state, [&](dem::Index i) { return text("grain ", s.before.state.id[i]); });
   return s;
 }
 
@@ -424,8 +449,7 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, outpu
     out.warnings = asks_for_other_layers(c, index);
     return out;
   }
-  const dem::ContactParameters& grain = now.scene.with(dem::Material::grain);
-  if (s.staggered && grain.mu_d == grain.mu_s) dem::mark_slipping(now.scene, s);
+  if (s.staggered) dem::mark_slipping(now.scene, s);
   dem::synchronise(now.scene, s);
   forget(stage, s);
   if (!top_wall_of(c, stage, start, 0).is_there())

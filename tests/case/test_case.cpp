@@ -351,10 +351,12 @@ TEST_F(CaseTest, unknown_keys_name_the_nearest) {
   EXPECT_EQ(fault_of("[contcat]\nmu_s = 9\n" + settle),
             "x/case.toml:1: [contcat]: unknown table; did you mean [contact]?");
   EXPECT_EQ(fault_of("[ice]\nmu = 9\n" + settle),
-            "x/case.toml:1: [ice]: unknown table; known: box, grains, contact, wall, model, fluid, stage, "
+            "x/case.toml:1: [ice]: unknown table; known: box, grains, contact, wall, model, fluid, material, "
+            "pair, stage, "
             "output, guards");
   EXPECT_EQ(fault_of("[wall]\nroughness = 9\n" + settle),
-            "x/case.toml:2: wall.roughness = 9: unknown key; known here: k_t, young, poisson, restitution, mu_roll, k_roll, mu_twist, k_twist, cohesion, mass, gamma_n, gamma_t");
+            "x/case.toml:2: wall.roughness = 9: unknown key; known here: k_t, material, young, poisson, "
+            "restitution, mu_roll, k_roll, mu_twist, k_twist, cohesion, mass, gamma_n, gamma_t");
   EXPECT_EQ(
       fault_of(settle + "normal_stres = 3\n"),
       "x/case.toml:5: stage.settle.normal_stres = 3: unknown key; did you mean stage.settle.normal_stress?");

@@ -128,7 +128,7 @@ TEST(OneGrain, InHydrostaticWaterIsBuoyant) {
   State s = dem::run(*engine, bed.scene, bed.state, 1000);
   dem::synchronise(bed.scene, s);
   const double a = -s.v[0].z / (1000 * 1e-5);
-  EXPECT_NEAR(a / ((1 - 1000 / bed.scene.density) * 9.8), 1, 1e-12);
+  EXPECT_NEAR(a / ((1 - 1000 / bed.scene.density_of(dem::Material::grain)) * 9.8), 1, 1e-12);
 }
 
 TEST(LinearPressure, PushesAGrainAlikeWhereverItIs) {

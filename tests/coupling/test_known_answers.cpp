@@ -302,7 +302,7 @@ TEST(MeanLoads, OverAnIntervalBalance) {
   bed.state = at_rest(bed.scene, bed.state);
   double weight = 0;  // N, submerged
   for (const double r : bed.state.r)
-    weight += dem::sphere_volume(r) * (bed.scene.density - 1000) * bed.scene.gravity;
+    weight += dem::sphere_volume(r) * (bed.scene.density_of(dem::Material::grain) - 1000) * bed.scene.gravity;
   const double area = bed.scene.area();
   for (const std::int64_t m : {1, 2, 3}) {
     Water w = water_over(bed, Column::height);
@@ -342,7 +342,8 @@ class Seepage : public ::testing::Test {
   void SetUp() override {
     bed.scene.fluid_density = 1000;
     for (const double r : bed.state.r)
-      weight += dem::sphere_volume(r) * (bed.scene.density - 1000) * bed.scene.gravity;
+      weight +=
+          dem::sphere_volume(r) * (bed.scene.density_of(dem::Material::grain) - 1000) * bed.scene.gravity;
   }
   WetRun under(double share) {
     Water w = water_over(bed, height);

@@ -44,7 +44,8 @@ Input any_input(Random& random) {
   q.before = {random.vector(1), random.vector(100), random.vector(100)};
   if (random(0, 1) < 0.8) q.spring.delta_t = random.vector(1e-4);
   q.spring.slipping = random(0, 1) < 0.5 ? 1 : 0;
-  q.spring.a_before = random(0, 3e-3), q.spring.rolled = random.vector(1e-4), q.spring.twisted = random(-1, 1) * 1e-4;
+  q.spring.a_before = random(0, 3e-3), q.spring.rolled = random.vector(1e-4),
+  q.spring.twisted = random(-1, 1) * 1e-4;
   if (random(0, 1) < 0.7) q.spring.v_before = random.vector(1), q.spring.f_viscous = random.vector(k * 1e-4);
   return q;
 }

@@ -76,8 +76,8 @@ Cycle cycle(const std::vector<std::pair<double, double>>& corners, int steps) {
   return out;
 }
 
-// What shear gives is stored or booked, and no loop of normal and shear force creates energy: with the spring's
-// force kept in unloading, or its displacement in loading, one of these loops would.
+// What shear gives is stored or booked, and no loop of normal and shear force creates energy: with the
+// spring's force kept in unloading, or its displacement in loading, one of these loops would.
 TEST(Mindlin, NoCycleCreatesEnergy) {
   const double x = 1e-5, u = 2e-6;
   for (const auto& corners : {std::vector<std::pair<double, double>>{{x, 0}, {x, u}, {3 * x, u}, {3 * x, 0}},

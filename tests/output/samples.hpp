@@ -55,8 +55,7 @@ inline dem::State random_state(RandomNumbers& number, dem::Index n) {
       list->push_back(number.vector());
     }
     s.part_of.push_back(static_cast<dem::BodyId>(k % 3));
-    if (k > 0)
-      s.contacts.push_back({k - 1, k, spring(k % 2)});
+    if (k > 0) s.contacts.push_back({k - 1, k, spring(k % 2)});
     s.wall_contacts.push_back({k, dem::BodyId::floor, spring(1)});
   }
   if (n > 0) s.wall_contacts.push_back({0, dem::BodyId::top_wall, spring(0)});

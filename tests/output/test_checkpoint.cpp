@@ -303,8 +303,8 @@ TEST_F(CheckpointFile, RefusesWhatIsNoScene) {
   const auto five = [](auto& choice) { choice = static_cast<std::decay_t<decltype(choice)>>(5); };
   expect_refused([&](Scene& s) { five(s.body(BodyId::floor).shape); },
                  "/shape: 5 is not a value from 0 to 2");
-  expect_refused([&](Scene& s) { five(s.body(BodyId::floor).material); },
-                 "/material: 5 is not a value from 0 to 1");
+  expect_refused([&](Scene& s) { s.body(BodyId::floor).material = static_cast<dem::Material>(5); },
+                 "/material: 5 is not a value from 0 to 4");
   expect_refused([&](Scene& s) { five(s.body(BodyId::floor).x.kind); },
                  "/kind: 5 is not a value from 0 to 3");
   expect_refused([](Scene& s) { s.body(BodyId::floor) = dem::layer({}, true); }, "the floor has the shape");

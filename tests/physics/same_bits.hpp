@@ -22,7 +22,7 @@ inline void expect_same_bits(const State& a, const State& b) {
   same(a.x, b.x, "x"), same(a.v, b.v, "v"), same(a.omega, b.omega, "omega");
   same(a.rotation, b.rotation, "rotation"), same(a.force, b.force, "force"),
       same(a.torque, b.torque, "torque");
-  same(a.x_start, b.x_start, "x_start");
+  same(a.x_start, b.x_start, "x_start"), same(a.material, b.material, "material");
   same(a.contacts, b.contacts, "contacts");
   const auto members = [](const std::vector<WallContact>& contacts) {  // without what lies between them
     std::vector<std::array<double, 12>> out;

@@ -16,7 +16,7 @@
 namespace moraine::dem {
 
 inline double length(const Vec3d& a) { return std::sqrt(dot(a, a)); }
-inline double mass(const Scene& s, double r) { return sphere_mass(s.density, r); }
+inline double mass(const Scene& s, double r) { return sphere_mass(s.density_of(Material::grain), r); }
 inline double inertia(const Scene& s, double r) { return 0.4 * mass(s, r) * r * r; }
 
 // Parameters of a contact, all of which a test has to give.
@@ -36,7 +36,7 @@ struct LinearContact {
 inline void use_hertz(Scene& s, double restitution = 1) {
   for (ContactParameters& p : s.contact) {
     p.k_n = p.k_t = 0, p.E_star = 5e8, p.G_star = 1e8;
-    p.zeta = damping_ratio(restitution), p.density_i = p.density_j = s.density;
+    p.zeta = damping_ratio(restitution), p.density_i = p.density_j = s.density_of(Material::grain);
   }
 }
 inline void resist_rolling(Scene& s, double mu_roll = 0.1, double mu_twist = 0) {

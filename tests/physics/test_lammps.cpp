@@ -45,7 +45,7 @@ Bed read_bed(const fs::path& path) {
   for (std::size_t i = 0; i < n; ++i) at[i] = {x[4 * i], x[4 * i + 1], x[4 * i + 2]}, r[i] = x[4 * i + 3];
   Bed bed{{}, grains_at_rest(r, at)};
   bed.scene.box = {box[0], box[1], box[2]};
-  bed.scene.density = law[10];
+  bed.scene.density.fill(law[10]);
   bed.scene.contact.fill(LinearContact{k[0], k[1], 0, 0, law[4], law[4]});
   return bed;
 }

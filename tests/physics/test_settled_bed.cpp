@@ -42,7 +42,7 @@ TEST_P(SettledBed, StressIsWeight) {
   for (Index i = 0; i < now.size(); ++i)
     if (now.x[i].z > low && now.x[i].z < high) solid += sphere_volume(now.r[i]);
   const double porosity = 1 - solid / (s.area() * (high - low));
-  EXPECT_NEAR(-slope / ((1 - porosity) * s.density * s.gravity * s.area()), 1, 0.05);
+  EXPECT_NEAR(-slope / ((1 - porosity) * s.density_of(Material::grain) * s.gravity * s.area()), 1, 0.05);
 }
 
 ON_EVERY_BACKEND(SettledBed);

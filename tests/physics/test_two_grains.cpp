@@ -130,6 +130,24 @@ TEST_P(TwoGrains, WhatSlipsGoesOnSlippingWhereAStageBegins) {
   }
 }
 
+// Two grains of a layer whose velocity varies across y lie in each other's way: one passes through the other,
+// at the velocity of its place. A third, which is free, is pushed aside.
+TEST_P(TwoGrains, OfALayerThatVariesAcrossItPassEachOther) {
+  const auto engine = make();
+  Scene s = empty_space(k);
+  s.box = {1, 0.4, 1};
+  s.dt = 1e-5;
+  drive_top_layer(s, Drive::at(0.1));
+  s.body(BodyId::top_layer).x.profile = Profile::linear;
+  State grains = grains_at_rest({r1, r1, r1}, {{0.5, 0.2, 0.5}, {0.51, 0.19, 0.5}, {0.519, 0.2, 0.5}});
+  grains.part_of = {BodyId::top_layer, BodyId::top_layer, BodyId::none};
+  const State end = run(*engine, s, grains, 20000);
+  EXPECT_NEAR(end.x[0].x - 0.5, 0.5 * 0.1 * 0.2, 1e-9);
+  EXPECT_NEAR(end.x[1].x - 0.51, 0.475 * 0.1 * 0.2, 1e-9);
+  EXPECT_EQ(end.x[0].z, 0.5);
+  EXPECT_GT(end.x[2].x, 0.53);
+}
+
 ON_EVERY_BACKEND(TwoGrains);
 
 // A pair with a strained tangential spring, carried round once as one rigid body, about four axes in the four

@@ -26,7 +26,7 @@ def cases_of(study):
 
 
 def test_every_study_can_be_read():
-    assert reproduce.studies() == ["creep-2016", "grading", "hardening-2015", "paper-2013"]
+    assert reproduce.studies() == ["angular", "creep-2016", "grading", "hardening-2015", "hysteresis", "lateral", "paper-2013"]
     for name in reproduce.studies():
         for quick in False, True:
             assert cases_of(AnyStudy(root / "cases" / name, quick=quick))

@@ -97,6 +97,16 @@ const Kind kinds[] = {
      "bottom_pressure = { ramp = [0, 200], over = 0.09 }\nbottom_pressure_amplitude = 50\n"
      "bottom_pressure_frequency = 30\n",
      0.0625},
+    {"materials",
+     "[grains]\nmaterial = \"clay\"\n[[material]]\nname = \"quartz\"\nmu_s = 0.6\nmu_d = 0.3\nlayer = [\"0 "
+     "m\", "
+     "\"0.15 m\"]\n[[material]]\nname = \"clay\"\ndensity = 1800\nk_n = 1.5e5\nmu_s = 0.2\ngamma_n = 3\n",
+     "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\n", 0.0625},
+    {"wet_materials",
+     "[fluid]\nenabled = true\ncompressibility = 1e-6\n[grains]\nmaterial = \"clay\"\n[[material]]\nname = "
+     "\"quartz\"\nmu_s = 0.6\nlayer = [\"0 m\", \"0.15 m\"]\n[[material]]\nname = \"clay\"\ndensity = "
+     "1300\nmu_s = 0.2\n",
+     "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\n", 0.0625},
     {"wet_settle", "[fluid]\nenabled = true\ncompressibility = 1e-6\nheight = 0.5\n",
      "kind = \"settle\"\nwall_gamma_n = 40\nwall_gamma_t = 40\n", 0.0625},
 };

@@ -57,8 +57,7 @@ TEST(SweepPlan, CommasInQuotesAndBracketsAreNoLists) {
       plan_sweep({{"title", "\"dense, dry\""}, {"stages", "[\"settle\", \"shear\"]"}, {"seed", "1,2"}});
   EXPECT_EQ(names(plan), (std::vector<std::string>{"seed-1", "seed-2"}));
   EXPECT_EQ(plan.cases[0].overrides[0].value, "\"dense, dry\"");
-  const run::Plan loads =
-      plan_sweep({{"stage.a.normal_stress", "{ ramp = [1e3, 2e3], over = 1 }, 4000"}});
+  const run::Plan loads = plan_sweep({{"stage.a.normal_stress", "{ ramp = [1e3, 2e3], over = 1 }, 4000"}});
   ASSERT_EQ(loads.cases.size(), 2u);
   EXPECT_EQ(loads.cases[0].overrides[0].value, "{ ramp = [1e3, 2e3], over = 1 }");
 }

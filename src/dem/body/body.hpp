@@ -87,9 +87,16 @@ struct Drive {
   }
 };
 
-// The materials of bodies. All grains are of one so far.
-enum class Material : std::int32_t { grain, wall };
-constexpr int materials = 2;
+// Grains are of up to four materials, all walls of one more. `grain` is the first of grains, the only one of
+// most scenes. The numbers stand in checkpoints and snapshots.
+enum class Material : std::uint8_t { grain, grain_2, grain_3, grain_4, wall };
+constexpr int grain_materials = 4, materials = grain_materials + 1;
+
+// Ordered pairs, of a grain and what it touches, numbered for tables of what they have between them.
+constexpr int material_pairs = grain_materials * materials;
+MORAINE_HD constexpr int pair_number(Material i, Material j) {
+  return static_cast<int>(i) * materials + static_cast<int>(j);
+}
 
 struct Body {
   enum class Shape { absent, plane, layer };

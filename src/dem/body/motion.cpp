@@ -48,7 +48,7 @@ Servo servo_of(const Scene& scene, const State& s, BodyId id, int axis, int plan
     for (Index i = 0; i < s.size(); ++i)
       if (s.part_of[i] == id) {
         const double share = servo.share(scene, s.x[i]);
-        servo.mass += share * share * scene.inertial_mass(s.r[i]);
+        servo.mass += share * share * scene.inertial_mass(s.r[i], s.material_of(i));
       }
   return servo;
 }

@@ -13,9 +13,9 @@ struct PlaneAction {
 
 template <class L, Account account>
 MORAINE_HD PlaneAction plane_action(const Scene& scene, double dt, const Plane& plane, const GrainRow& grain,
-                                    Spring<double>& spring) {
+                                    Spring<double>& spring, Material material = Material::grain) {
   const Geometry<double> g = plane.geometry(grain.x, grain.r);
-  const Action<double> a = contact_law<L, account>(scene.with(plane.material), dt, g,
+  const Action<double> a = contact_law<L, account>(scene.between(material, plane.material), dt, g,
                                                    {grain.v - plane.v, grain.omega, {0, 0, 0}}, spring);
   if constexpr (L::couples) return {a.f, a.torque_on_i(g), a.slip, a.viscous};
   return {a.f, g.l_i * a.f_x_n, a.slip, a.viscous};

@@ -42,6 +42,10 @@ std::vector<Chunk> chunks_of(const Bed& bed, const State& s, const BodyMotion& b
   return chunks;
 }
 
+const ContactParameters& between(const Bed& bed, Index i, Index j) {
+  return bed.scene.between(bed.material_of(i), bed.material_of(j));
+}
+
 // As near pairs, from which the search takes their springs. Contacts are sorted.
 void place_contacts(Bed& bed, const std::vector<Contact>& contacts) {
   auto contact = contacts.begin();
@@ -50,9 +54,14 @@ void place_contacts(Bed& bed, const std::vector<Contact>& contacts) {
       const auto& [i, j, spring] = *contact;
       const int part = j < chunk.end ? 0 : 1;
       const Index place =
-          chunk.near[part].add(i, j, 0, false, remembered(bed.scene, Material::grain, spring));
+          chunk.near[part].add(i, j, 0, false, remembered(bed.scene, between(bed, i, j), spring));
       chunk.candidates[part].push_back({i, j, no_link, place});
     }
+  if (bed.order.material)
+    for (Chunk& chunk : bed.chunks)
+      for (auto& candidates : chunk.candidates)
+        std::ranges::stable_sort(candidates, {},
+                                 [&](const Candidate& c) { return bed.order.pair(c.i, c.j); });
 }
 
 void place_plane_contacts(Bed& bed, const std::vector<WallContact>& contacts, const BodyMotion& bodies) {
@@ -60,7 +69,7 @@ void place_plane_contacts(Bed& bed, const std::vector<WallContact>& contacts, co
     if (const Plane* plane = bodies.find(w.wall))
       bed.chunks[bed.order.chunk_of(w.i)].planes.push_back(
           {w.i, static_cast<std::int32_t>(plane - bodies.plane),
-           remembered(bed.scene, plane->material, w.spring)});
+           remembered(bed.scene, bed.scene.between(bed.material_of(w.i), plane->material), w.spring)});
   for (Chunk& chunk : bed.chunks)
     std::ranges::sort(chunk.planes, {}, [](const PlanePair& p) { return std::tuple(p.i, p.plane); });
 }
@@ -73,9 +82,10 @@ void Bed::load_state(const Scene& s, const State& state, const BodyMotion& bodie
   r_max = *std::max_element(state.r.begin(), state.r.end());
   margin = neighbour_margin(s, state);
   searched.resize(n);
-  order = {chunk_size(n)};
-
   part_of.set(state.part_of);
+  material = state.material;
+  order = {chunk_size(n), material.empty() ? nullptr : material.data()};
+
   grain.resize(n + 1), load.resize(n);
   water.resize(uses.water ? n : 0);
   const std::vector<GrainRow> rows = grain_rows(s, state);

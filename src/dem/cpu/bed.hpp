@@ -96,14 +96,18 @@ struct Bed {
   std::vector<Chunk> chunks;
   std::vector<Link> links;
   Host::Array<BodyId> part_of;
-  Host::Array<GrainRow> grain;   // n grains, then one that never touches
-  Host::Array<WayRow> searched;  // where grains were at the last search
+  std::vector<Material> material;  // as State has it
+  Host::Array<GrainRow> grain;     // n grains, then one that never touches
+  Host::Array<WayRow> searched;    // where grains were at the last search
   double plane_searched[most_planes];
   Host::Array<LoadRow> load;  // of the last step of advance()
   Host::Array<LoadRow> slot;  // the first one is for lanes without a pair
   Host::Array<Index> slot_owner;
   Host::Array<WaterRow> water;  // with pore water only: at the last exchange, for state()
 
+  Material material_of(Index i) const {
+    return material.empty() ? Material::grain : material[static_cast<std::size_t>(i)];
+  }
   // Grains and springs of a state; neither lists nor links.
   void load_state(const Scene& s, const State& state, const BodyMotion& bodies);
 };

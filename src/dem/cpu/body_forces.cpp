@@ -28,8 +28,8 @@ void plane_forces(Bed& bed, Chunk& chunk, const ChunkStep& at) {
     const bool touches = bodies.plane[p.plane].gap(bed.grain.data()[p.i].x, bed.grain.data()[p.i].r) < 0;
     if (!touches && !p.touched) continue;  // one that has just opened gives up what its spring held
     p.touched = touches;
-    const PlaneAction a =
-        plane_action<L, account>(bed.scene, at.dt, bodies.plane[p.plane], bed.grain.data()[p.i], p.spring);
+    const PlaneAction a = plane_action<L, account>(bed.scene, at.dt, bodies.plane[p.plane],
+                                                   bed.grain.data()[p.i], p.spring, bed.material_of(p.i));
     LoadRow& load = at.load[p.i];
     load.f += a.f, load.torque += a.torque, load.slip += a.slip, load.viscous += a.viscous;
     for (int k = 0; k < bodies.servos; ++k) {

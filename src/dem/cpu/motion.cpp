@@ -1,4 +1,6 @@
 // Moves the grains of a chunk on to the next step (leapfrog.hpp), and leaves their loads empty.
+#include <limits>
+
 #include "dem/cpu/rows.hpp"
 #include "dem/cpu/tasks.hpp"
 #include "dem/leapfrog.hpp"
@@ -34,7 +36,10 @@ void move(Bed& bed, Chunk& chunk, const ChunkStep& at) {
   });
   const Row zero(0.0), dt(scene.dt, scene.dt, scene.dt, 0);
   const Row all_three(1, 1, 1, 0), only_z(0, 0, 1, 0), down(scene.down.x, scene.down.y, scene.down.z, 0);
-  const Row usual_fall = Row(scene.submerged_gravity()) * down;
+  const Row usual_fall = Row(scene.submerged_gravity(Material::grain)) * down;
+  // Below this radius a grain falls in its own way: with several materials each does.
+  const double falls_alike =
+      bed.material.empty() ? scene.least_inertia : std::numeric_limits<double>::infinity();
   [[maybe_unused]] const Row steps(static_cast<double>(scene.exchange_interval));
   // The fourth numbers of these are energies.
   Row sum_f = zero, group_f = zero, sum_torque = zero, group_torque = zero, fastest2 = zero;
@@ -49,7 +54,7 @@ void move(Bed& bed, Chunk& chunk, const ChunkStep& at) {
     if constexpr (impulse == Impulse::of_water)
       if (at.push) force = fma(steps, row(at.push[i].f), f);
     Row fall = free ? usual_fall : zero;
-    if (free && g.r < scene.least_inertia) fall = Row(scene.fall(g.r)) * down;
+    if (free && g.r < falls_alike) fall = Row(scene.fall(g.r, bed.material_of(i))) * down;
     const Row acceleration = fma(force, inverse_mass, fall);
     const Row spin_acceleration = torque * Row(g.inverse_inertia);
     Kinematics<Row> k{row(g.x), row(g.v), row(g.omega), row(g.rotation)};

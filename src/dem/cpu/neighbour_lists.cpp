@@ -19,17 +19,19 @@ constexpr int steps_foreseen = 48;
 constexpr int fewest_steps = 24, most_steps = 128;
 constexpr double least_near_margin = 1e-6;  // of the largest radius
 
-// Places in the near list of the candidates there were, asked for by (i, j).
+// Places in the near list of the candidates there were, asked for in the order of candidates.
 class OldPlaces {
  public:
-  explicit OldPlaces(std::vector<Candidate> old) : old_(std::move(old)) {}
+  OldPlaces(const ContactOrder& order, std::vector<Candidate> old) : order_(order), old_(std::move(old)) {}
   Index of(Index i, Index j) {
-    while (next_ < old_.size() && std::tie(old_[next_].i, old_[next_].j) < std::tie(i, j)) ++next_;
+    const auto at = [this](Index a, Index b) { return std::tuple(order_.pair(a, b), a, b); };
+    while (next_ < old_.size() && at(old_[next_].i, old_[next_].j) < at(i, j)) ++next_;
     const bool known = next_ < old_.size() && old_[next_].i == i && old_[next_].j == j;
     return known ? old_[next_].place : not_near;
   }
 
  private:
+  const ContactOrder& order_;
   std::vector<Candidate> old_;  // sorted
   std::size_t next_ = 0;
 };
@@ -45,21 +47,21 @@ void for_each_chunk(const Host& space, Bed& bed, Work&& work) {
 // Pairs that the grains of one chunk find, each pair once by one of its grains; the other may be of an
 // earlier chunk, whose pair it then is.
 void find_pairs(const Bed& bed, Chunk& chunk, const CloseGrains& grains) {
-  const auto is_rigid = [&](Index i) { return bed.scene.is_rigid(bed.part_of.data()[i]); };
+  const BodyId* const part_of = bed.part_of.data();
   for (auto& [of, pairs] : chunk.found) pairs.clear();
   std::vector<GrainPair>& own = chunk.found[chunk.number];
   for (Index a = chunk.begin; a < chunk.end; ++a) {
-    const bool rigid = is_rigid(a);
+    const bool free = part_of[a] == BodyId::none;
     grains.after(grains.place(a), bed.margin, [&](Index k, double, double) {
       const Index b = grains.grain(k);
-      if (rigid && is_rigid(b)) return;
+      if (!free && bed.scene.never_touch(part_of[a], part_of[b])) return;
       const GrainPair pair{std::min(a, b), std::max(a, b)};
       (pair.i >= chunk.begin ? own : chunk.found[bed.order.chunk_of(pair.i)]).push_back(pair);
     });
   }
 }
 
-// Pairs of one chunk that all have found, by (i, j).
+// Pairs of one chunk that all have found, by pair of materials and (i, j).
 std::vector<GrainPair> sorted_pairs(const Bed& bed, const Chunk& chunk) {
   std::vector<std::size_t> row(chunk.end - chunk.begin + 2);  // where that of i ends, two places on
   const auto each = [&](auto&& use) {
@@ -74,12 +76,15 @@ std::vector<GrainPair> sorted_pairs(const Bed& bed, const Chunk& chunk) {
     std::sort(pairs.begin() + static_cast<std::ptrdiff_t>(row[k]),
               pairs.begin() + static_cast<std::ptrdiff_t>(row[k + 1]),
               [](const GrainPair& a, const GrainPair& b) { return a.j < b.j; });
+  if (bed.order.material)
+    std::ranges::stable_sort(pairs, {}, [&](const GrainPair& p) { return bed.order.pair(p.i, p.j); });
   return pairs;
 }
 
-// Candidates of one chunk, by (i, j), and how many go to each later chunk.
+// Candidates of one chunk, in that order, and how many go to each later chunk.
 void take_pairs(const Bed& bed, Chunk& chunk) {
-  OldPlaces inside(std::exchange(chunk.candidates[0], {})), across(std::exchange(chunk.candidates[1], {}));
+  OldPlaces inside(bed.order, std::exchange(chunk.candidates[0], {})),
+      across(bed.order, std::exchange(chunk.candidates[1], {}));
   chunk.outgoing.clear();
   for (const auto& [i, j] : sorted_pairs(bed, chunk)) {
     if (j < chunk.end) {
@@ -122,6 +127,7 @@ void draw_pairs(Bed& bed, Chunk& chunk, int part, double far) {
   PairList& list = chunk.spare;
   WatchList& watched = chunk.watched[part];
   list.clear(), watched.clear();
+  const auto fill_up = [&] { list.pad(chunk.begin, bed.n, part == 1 ? 0 : chunk.begin); };
   std::vector<Candidate>& candidates = chunk.candidates[part];
   for (std::size_t start = 0; start < candidates.size(); start += Pack::width) {
     const int used = static_cast<int>(std::min<std::size_t>(Pack::width, candidates.size() - start));
@@ -154,11 +160,16 @@ void draw_pairs(Bed& bed, Chunk& chunk, int part, double far) {
         target = link.first + link.used++;
         bed.slot_owner.data()[target] = q.j;
       }
+      if (const int pair = bed.order.pair(q.i, q.j);
+          list.runs.empty() || list.runs.back().materials != pair) {
+        fill_up();
+        list.begin_run(pair);
+      }
       const Spring<double> spring = q.place == not_near ? Spring<double>{} : old.spring(q.place);
       q.place = list.add(q.i, q.j, target, across_sides, spring);
     }
   }
-  list.pad(chunk.begin, bed.n, part == 1 ? 0 : chunk.begin);
+  fill_up();
   std::swap(old, list);
 }
 

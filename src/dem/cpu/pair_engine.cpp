@@ -55,13 +55,13 @@ class PairEngine final : public Engine {
   std::optional<SearchMargin> margin_;
   std::optional<ThreadCount> count_;
   std::int64_t searches_ = 0;
-  State kept_;  // what no step changes: ids, x_start, bodies that do not move
+  State kept_;  // what no step changes: ids, x_start, materials, bodies that do not move
 };
 
 void PairEngine::load(const Scene& scene, const State& s, FluidCoupling* fluid) {
   check_scene(scene, s);
   kept_ = {};
-  kept_.id = s.id, kept_.x_start = s.x_start, kept_.bodies = s.bodies;
+  kept_.id = s.id, kept_.x_start = s.x_start, kept_.material = s.material, kept_.bodies = s.bodies;
   // Below some 1,500 grains a thread waits longer at barriers than it works.
   threads_ = threads_wanted_ > 0 ? threads_wanted_ : std::clamp(s.size() / 1500, 1, available_cores());
   control_ = {};
@@ -96,7 +96,7 @@ void PairEngine::start(const Scene& scene) {
     LoadRow& load = bed_.load.data()[i];
     const LoadRow whole =
         bed_.uses.water ? with_water(scene, bodies.step, load, bed_.water.data()[i].f) : load;
-    half_step_back(scene, bed_.grain.data()[i], whole);
+    half_step_back(scene, bed_.grain.data()[i], bed_.material_of(i), whole);
     load.slip = load.viscous = 0;
   }
 }

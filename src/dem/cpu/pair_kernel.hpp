@@ -100,7 +100,7 @@ inline void scatter(const Offset* at_i, const Offset* at_target, const Geometry<
 
 // What the law remembers of as many pairs, the first of which has this place; and no more.
 template <class L, Account account, class P>
-inline Spring<P> recalled(const PairList& list, std::int64_t place) {
+inline Spring<P> recalled(const PairList& list, std::size_t place) {
   Spring<P> spring;
   MoreParts::for_each_memory([&]<class Part>() {
     if constexpr (L::template remembers<Part, account>) {
@@ -112,7 +112,7 @@ inline Spring<P> recalled(const PairList& list, std::int64_t place) {
   return spring;
 }
 template <class L, Account account, class P>
-inline void remember(const Spring<P>& spring, PairList& list, std::int64_t place) {
+inline void remember(const Spring<P>& spring, PairList& list, std::size_t place) {
   MoreParts::for_each_memory([&]<class Part>() {
     if constexpr (L::template remembers<Part, account>) {
       const typename Part::template Memory<P>& from = spring;
@@ -123,7 +123,7 @@ inline void remember(const Spring<P>& spring, PairList& list, std::int64_t place
 }
 
 template <class L, Account account>
-inline void ask_for(const PairList& list, std::int64_t group) {
+inline void ask_for(const PairList& list, std::size_t group) {
   ask_for(list.pairs[group]);
   MoreParts::for_each_memory([&]<class Part>() {
     if constexpr (L::template remembers<Part, account>) ask_for(list.of<Part>()[group]);
@@ -131,10 +131,10 @@ inline void ask_for(const PairList& list, std::int64_t group) {
 }
 
 template <class L, Account account, Shares shares, Lists lists, class P>
-[[gnu::flatten]] void list_forces(Bed& bed, PairList& list, double dt, LoadRow* load) {
+[[gnu::flatten]] void run_forces(Bed& bed, PairList& list, std::size_t run, double dt, LoadRow* load) {
   constexpr int packs = block_pairs / P::width, packs_in_group = lanes / P::width;
   const Rows rows(bed.grain);
-  const ContactParameters law = bed.scene.with(Material::grain);
+  const ContactParameters law = bed.scene.contact[static_cast<std::size_t>(list.runs[run].materials)];
   const Sides sides = bed.sides;
   LoadRow* const slot = bed.slot.data();
 
@@ -151,11 +151,12 @@ template <class L, Account account, Shares shares, Lists lists, class P>
       return motion[q].before.v;
   };
 
-  const auto all = static_cast<std::int64_t>(list.pairs.size()) * packs_in_group;
-  for (std::int64_t start = 0; start < all; start += packs) {
-    const int block = static_cast<int>(std::min<std::int64_t>(packs, all - start));
+  const auto first = static_cast<std::size_t>(list.runs[run].first_group) * packs_in_group,
+             all = static_cast<std::size_t>(list.end_of(run)) * packs_in_group;
+  for (std::size_t start = first; start < all; start += packs) {
+    const int block = static_cast<int>(std::min<std::size_t>(packs, all - start));
     const auto group = [&](int q) -> const PairGroup& { return list.pairs[(start + q) / packs_in_group]; };
-    const auto lane = [&](int q) { return static_cast<int>((start + q) % packs_in_group) * P::width; };
+    const auto lane = [&](int q) { return (start + q) % packs_in_group * P::width; };
     const auto place = [&](int q) { return (start + q) * P::width; };
 
     for (int q = 0; q < block; ++q) {
@@ -169,7 +170,7 @@ template <class L, Account account, Shares shares, Lists lists, class P>
       if constexpr (L::rubs) slides[q] = slide(dt, geometry[q], motion[q].before);
     }
     for (int q = 0; q < block; ++q) {
-      const std::int64_t later = std::min(start + q + packs, all - 1);
+      const std::size_t later = std::min(start + q + packs, all - 1);
       const Offset* const at_j = &list.pairs[later / packs_in_group].j[later % packs_in_group * P::width];
       for (int k = 0; k < P::width; ++k)
         __builtin_prefetch(&rows.grain(at_j[k]).x), __builtin_prefetch(&rows.grain(at_j[k]).omega);
@@ -190,6 +191,12 @@ template <class L, Account account, Shares shares, Lists lists, class P>
       scatter<L, shares>(&p.i[lane(q)], &p.target[lane(q)], at, a, load, slot);
     }
   }
+}
+
+template <class L, Account account, Shares shares, Lists lists, class P>
+void list_forces(Bed& bed, PairList& list, double dt, LoadRow* load) {
+  for (std::size_t run = 0; run < list.runs.size(); ++run)
+    run_forces<L, account, shares, lists, P>(bed, list, run, dt, load);
 }
 
 template <class L, Account account, class P>

@@ -3,7 +3,7 @@
 namespace moraine::dem::cpu {
 
 void PairList::clear() {
-  pairs.clear(), count = 0;
+  pairs.clear(), runs.clear(), count = 0;
   MoreParts::for_each_memory([&]<class Part>() { of<Part>().clear(); });
 }
 

@@ -1,5 +1,5 @@
-// Near pairs of one chunk, as the SIMD loop reads them: groups of eight pairs, by (i, j), which it takes in
-// one or more packs.
+// Near pairs of one chunk, as the SIMD loop reads them: groups of eight pairs, by pair of materials and (i,
+// j), which it takes in one or more packs.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -40,24 +40,31 @@ inline void get_lane(Vec3d& to, const Vec3<Lanes>& v, int lane) {
 
 // As many of them as P has lanes, from `lane` on.
 template <class P>
-void load_lanes(P& p, const Lanes& from, std::int64_t lane) {
+void load_lanes(P& p, const Lanes& from, std::size_t lane) {
   p = P::load(from.v + lane);
 }
 template <class P>
-void load_lanes(Vec3<P>& p, const Vec3<Lanes>& from, std::int64_t lane) {
+void load_lanes(Vec3<P>& p, const Vec3<Lanes>& from, std::size_t lane) {
   load_lanes(p.x, from.x, lane), load_lanes(p.y, from.y, lane), load_lanes(p.z, from.z, lane);
 }
 template <class P>
-void store_lanes(const P& p, Lanes& to, std::int64_t lane) {
+void store_lanes(const P& p, Lanes& to, std::size_t lane) {
   p.store(to.v + lane);
 }
 template <class P>
-void store_lanes(const Vec3<P>& p, Vec3<Lanes>& to, std::int64_t lane) {
+void store_lanes(const Vec3<P>& p, Vec3<Lanes>& to, std::size_t lane) {
   store_lanes(p.x, to.x, lane), store_lanes(p.y, to.y, lane), store_lanes(p.z, to.z, lane);
 }
 
 struct PairList {
+  // Groups one after the other whose pairs are of one pair of materials, so that the loop over them has one
+  // set of parameters.
+  struct Run {
+    Index first_group;
+    int materials;  // pair_number
+  };
   std::vector<PairGroup> pairs;
+  std::vector<Run> runs;
   MoreParts::MemoryLists<std::vector, Lanes> memory;  // by group; empty where nothing is remembered
   unsigned remembered = 0;                            // which parts of the law, bit by bit
   Index count = 0;
@@ -65,6 +72,11 @@ struct PairList {
   void clear();
   // Returns its place in the list. target: see PairGroup.
   Index add(Index i, Index j, Index target, bool across_sides, const Spring<double>& spring);
+  // What is added from here on is of this pair of materials; the last group is full.
+  void begin_run(int materials) { runs.push_back({static_cast<Index>(pairs.size()), materials}); }
+  Index end_of(std::size_t run) const {  // in groups
+    return run + 1 < runs.size() ? runs[run + 1].first_group : static_cast<Index>(pairs.size());
+  }
   // Fills the last group with a pair that never touches.
   void pad(Index i, Index far_away, Index target);
   Spring<double> spring(Index place) const;

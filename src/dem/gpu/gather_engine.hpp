@@ -54,6 +54,7 @@ class GatherEngine final : public Engine {
     check_scene(scene, s);
     kept_ = {};
     kept_.id = s.id, kept_.x_start = s.x_start, kept_.part_of = s.part_of, kept_.bodies = s.bodies;
+    kept_.material = s.material;
     n_ = s.size();
     r_max_ = *std::max_element(s.r.begin(), s.r.end());
     uses_ = uses_of(scene);
@@ -64,13 +65,15 @@ class GatherEngine final : public Engine {
     control_.set({control});
     view_ = {};
     view_.scene = scene, view_.sides = Sides::of(scene);
-    view_.n = n_, view_.order = {chunk_size(n_)}, view_.margin = neighbour_margin(scene, s);
+    material_.set(s.material);
+    view_.n = n_, view_.order = {chunk_size(n_), s.material.empty() ? nullptr : material_.data()};
+    view_.margin = neighbour_margin(scene, s);
     view_.tallies = {control.bodies.servos};
     searches_ = 0;
     load_rows(s, control.bodies);
 
     search(s.step);
-    place_springs(s.contacts);
+    place_springs(s);
     refresh_view();
     if (s.staggered) return;
     start(control);
@@ -164,7 +167,8 @@ class GatherEngine final : public Engine {
     std::vector<SpringRow> springs(std::max<std::size_t>(planes * n_, 1));
     for (const WallContact& w : s.wall_contacts)
       if (const Plane* plane = bodies.find(w.wall))
-        springs[planes * w.i + (plane - bodies.plane)] = {remembered(view_.scene, plane->material, w.spring)};
+        springs[planes * w.i + (plane - bodies.plane)] = {
+            remembered(view_.scene, view_.scene.between(s.material_of(w.i), plane->material), w.spring)};
     plane_spring_.set(springs);
     lost_.resize(view_.chunks());
   }
@@ -181,7 +185,8 @@ class GatherEngine final : public Engine {
   }
 
   void search(std::int64_t step) {
-    lists_.build(space_, view_.scene, grain_[step & 1].data(), part_of_.data(), n_, view_.margin);
+    lists_.build(space_, view_.scene, grain_[step & 1].data(), part_of_.data(), n_, view_.margin,
+                 view_.order.material);
     ++searches_;
   }
 
@@ -196,15 +201,19 @@ class GatherEngine final : public Engine {
     refresh_view();
   }
 
-  void place_springs(const std::vector<Contact>& contacts) {
+  void place_springs(const State& s) {
     const std::vector<std::int64_t> row = lists_.row.get();
     const std::vector<Index> neighbour = lists_.neighbour.get();
     std::vector<SpringRow> springs(std::max<std::int64_t>(lists_.total, 1));
-    for (const Contact& c : contacts)
+    for (const Contact& c : s.contacts)
       for (const auto& [i, j] : {std::pair{c.i, c.j}, std::pair{c.j, c.i}})
         for (std::int64_t k = row[i]; k < row[i + 1]; ++k)
-          if (neighbour[k] == j) springs[k] = {remembered(view_.scene, Material::grain, c.spring)};
+          if (neighbour[k] == j) springs[k] = {remembered(view_.scene, between(s, c), c.spring)};
     spring_.set(springs);
+  }
+
+  const ContactParameters& between(const State& s, const Contact& c) const {
+    return view_.scene.between(s.material_of(c.i), s.material_of(c.j));
   }
 
   void launch(const GatherView& view, std::int64_t target) {
@@ -227,7 +236,7 @@ class GatherEngine final : public Engine {
     const std::vector<WaterRow> water = water_.get();
     for (Index i = 0; i < n_; ++i) {
       const LoadRow whole = fluid_ ? with_water(view_.scene, bodies.step, loads[i], water[i].f) : loads[i];
-      half_step_back(view_.scene, grains[i], whole);
+      half_step_back(view_.scene, grains[i], kept_.material_of(i), whole);
       loads[i].slip = loads[i].viscous = 0;
     }
     rows.set(grains), load_.set(loads), control_.set({control});
@@ -290,12 +299,13 @@ class GatherEngine final : public Engine {
   Array<LoadRow> load_;
   Array<WaterRow> water_;
   Array<BodyId> part_of_;
+  Array<Material> material_;
   Array<SpringRow> spring_, old_spring_, plane_spring_;
   Array<Tally> tally_[2], chunk_tally_[2];
   Array<Control> control_;
   Array<Index> lost_;
   std::int64_t searches_ = 0;
-  State kept_;  // what no step changes: ids, x_start, layers, bodies that do not move
+  State kept_;  // what no step changes: ids, x_start, layers, materials, bodies that do not move
 };
 
 }  // namespace moraine::dem::gpu

@@ -44,8 +44,8 @@ struct GrainTasks {
     for (int p = 0; p < bodies.planes; ++p) {
       const Plane& plane = bodies.plane[p];
       if (!(plane.gap(g.x, g.r) < w.margin)) continue;
-      const PlaneAction a =
-          plane_action<Planes, account>(w.scene, w.scene.dt, plane, g, w.plane_spring[bodies.planes * i + p]);
+      const PlaneAction a = plane_action<Planes, account>(
+          w.scene, w.scene.dt, plane, g, w.plane_spring[bodies.planes * i + p], w.material(i));
       load.f += a.f, load.torque += a.torque, load.slip += a.slip, load.viscous += a.viscous;
       for (int k = 0; k < bodies.servos; ++k) {
         const Servo& servo = bodies.servo[k];
@@ -75,7 +75,7 @@ struct GrainTasks {
               servo->share(w.scene, g.x) *
                   (servo->by_stress() ? servo->v : servo->next_velocity(w.scene.time(step), w.scene.dt)));
     const Triple dt(Vec3d{w.scene.dt, w.scene.dt, w.scene.dt});
-    const Mobility m = mobility(w.scene, g);
+    const Mobility m = mobility(w.scene, g, w.material(i));
     const Triple acceleration = m.acceleration(pushed(i, load).f),
                  spin_acceleration = m.spin_acceleration(load.torque);
     Kinematics<Triple> k{g.x, g.v, g.omega, g.rotation};
@@ -101,9 +101,10 @@ struct GrainTasks {
     const bool first = i < j;
     const GrainRow a = grain[first ? i : j], b = grain[first ? j : i];  // copies, read 16 bytes at a time
     const Geometry<double> g = between_grains(nearest_image(w.sides, a.x - b.x), a.r + b.r, a.r - b.r);
+    const ContactParameters& law = w.scene.contact[w.order.pair(i, j)];
     SpringRow spring = kept;  // read and written 16 bytes at a time, and only what the law uses
-    const Action<double> action = contact_law<Grains, account>(w.scene.with(Material::grain), w.scene.dt, g,
-                                                               {a.v - b.v, a.omega, b.omega}, spring);
+    const Action<double> action =
+        contact_law<Grains, account>(law, w.scene.dt, g, {a.v - b.v, a.omega, b.omega}, spring);
     kept = spring;
     if constexpr (Grains::couples) {
       if (first) return {action.f, action.slip, action.torque_on_i(g), 1, action.viscous};

@@ -13,7 +13,7 @@ struct GatherView {
   Scene scene;
   Sides sides;
   Index n;
-  ContactOrder order;  // chunks
+  ContactOrder order;  // chunks and materials
   double margin;       // m
   TallyLayout tallies;
   GrainRow* grain[2];
@@ -27,6 +27,7 @@ struct GatherView {
   Tally* chunk_tally[2];             // where blocks have whole chunks
   Control* control;
 
+  MORAINE_HD Material material(Index i) const { return order.material ? order.material[i] : Material::grain; }
   MORAINE_HD Index chunks() const { return (n + order.chunk - 1) / order.chunk; }
   MORAINE_HD Index groups() const { return (n + group_size - 1) / group_size; }
   MORAINE_HD Index chunk_groups() const { return order.chunk / group_size; }

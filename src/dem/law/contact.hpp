@@ -8,8 +8,8 @@
 //   torque on i: l_i f_t x n,  on j: l_j f_t x n              (eq. 4)
 //
 // This is the linear law; Hertz and Mindlin's (hertz.hpp) has another f_n, and a k_t that changes. Parts
-// (spring, friction, damping, and more) are types of their own; which of them are compiled together is said in
-// laws.hpp.
+// (spring, friction, damping, and more) are types of their own; which of them are compiled together is said
+// in laws.hpp.
 //
 // Time levels: n and delta_n belong to step n, the velocities to n - 1/2, so v_c dt is the displacement
 // between two steps (second order). Only the viscous parts need a velocity at step n (viscosity.hpp).
@@ -78,8 +78,7 @@ struct Law {
   // J, of springs along the contact plane and of couples.
   template <class P, class Spring>
   static double stored_tangential(const P& p, const Geometry<double>& g, const Spring& spring) {
-    double sum =
-        Friction::stored(Normal::k_t(p, Normal::at(p, g, reduced_radius(g))), spring.delta_t);
+    double sum = Friction::stored(Normal::k_t(p, Normal::at(p, g, reduced_radius(g))), spring.delta_t);
     for_each_couple([&]<class Part>() { sum += Part::stored(p, spring); });
     return sum;
   }
@@ -171,7 +170,8 @@ template <class L, class P, class T, class Spring>
 MORAINE_HD Vec3<T> trial_spring(const P& p, double dt, const Geometry<T>& g, const Patch<L, T>& patch,
                                 const Slide<T>& s, const Spring& spring) {
   if constexpr (L::hertz) {
-    const T q = share_held(dt, L::Normal::k_t(p, typename L::Normal::template At<T>{spring.a_before}), L::Normal::k_t(p, patch.at()));
+    const T q = share_held(dt, L::Normal::k_t(p, typename L::Normal::template At<T>{spring.a_before}),
+                           L::Normal::k_t(p, patch.at()));
     return carry(dt, g, Slide<T>{s.n_mid, T(0.5) * (T(1) + q) * s.v_c, s.twist}, q * spring.delta_t);
   } else {
     return carry(dt, g, s, spring.delta_t);
@@ -192,8 +192,7 @@ template <class L, class P, class T>
 MORAINE_HD T normal_force(const P& p, const Geometry<T>& g, const Patch<L, T>& patch, const Vec3<T>& v) {
   T f_n = L::Normal::force(p, g, patch.at());
   if constexpr (L::damps)
-    f_n =
-        L::Damping::normal(L::Damping::template gamma_n<typename L::Normal>(p, g, patch.at()), g, v, f_n);
+    f_n = L::Damping::normal(L::Damping::template gamma_n<typename L::Normal>(p, g, patch.at()), g, v, f_n);
   return select(g.delta_n < T(0), f_n, T(0));
 }
 
@@ -230,9 +229,10 @@ MORAINE_HD Grip<T> grip(const P& p, const Geometry<T>& g, const Patch<L, T>& pat
   }
 }
 
-// J that friction takes in a step; `trial` is what trial_spring() gives, `kept` what Coulomb's limit leaves of
-// it. Mean force times plastic displacement; a contact that opens gives up what its spring still held. Where
-// k_t changes: work of the mean force less what is stored then, with the displacement (trial - q old) 2/(1 + q).
+// J that friction takes in a step; `trial` is what trial_spring() gives, `kept` what Coulomb's limit leaves
+// of it. Mean force times plastic displacement; a contact that opens gives up what its spring still held.
+// Where k_t changes: work of the mean force less what is stored then, with the displacement (trial - q old)
+// 2/(1 + q).
 template <class L, class P, class T, class Spring>
 MORAINE_HD T taken_by_friction(const P& p, double dt, const Patch<L, T>& patch, const Vec3<T>& trial,
                                const Vec3<T>& kept, const Spring& spring) {
@@ -241,9 +241,8 @@ MORAINE_HD T taken_by_friction(const P& p, double dt, const Patch<L, T>& patch, 
   if constexpr (L::hertz) {
     const T k_before = dt == 0 ? k_t : L::Normal::k_t(p, typename L::Normal::template At<T>{spring.a_before});
     const T q = share_held(dt, k_before, k_t), inverse = T(1) / (T(1) + q);
-    const T by_change =
-        fma(T(1) - q, fma(k_t, dot(trial, trial), k_before * dot(old, old)),
-            T(2) * (k_before - q * k_t) * dot(old, trial));
+    const T by_change = fma(T(1) - q, fma(k_t, dot(trial, trial), k_before * dot(old, old)),
+                            T(2) * (k_before - q * k_t) * dot(old, trial));
     const Vec3<T> held = kept + inverse * (T(2) * q * old - (T(1) - q) * trial);
     return T(0.5) * fma(k_t, dot(held, trial - kept), inverse * by_change);
   } else {
@@ -268,8 +267,8 @@ MORAINE_HD void add_couples(const P& p, double dt, const Geometry<T>& g, const P
   };
   L::for_each_couple([&]<class Part>() {
     typename Part::template Memory<T>& memory = spring;
-    const Couple<T> c = Part::template couple<account == Account::energy>(p, g, patch.radius, f_n, turn,
-                                                                          carried, memory);
+    const Couple<T> c =
+        Part::template couple<account == Account::energy>(p, g, patch.radius, f_n, turn, carried, memory);
     a.couple += c.on_i;
     if constexpr (account == Account::energy) a.slip = a.slip + c.slip;
   });

@@ -5,11 +5,11 @@
 //   1/E* = (1 - nu_i^2)/E_i + (1 - nu_j^2)/E_j,   1/G* = (2 - nu_i)/G_i + (2 - nu_j)/G_j,  G = E/(2 (1 + nu))
 //   (Johnson 1985, Contact mechanics, eqs. 4.22 to 4.24 and 7.42)
 //
-// k_t changes with the normal force under a sheared spring. While a grows, the spring's force is kept, so that
-// its displacement shrinks by k_t before/k_t; while a shrinks, its displacement is kept, so that its force
-// falls with k_t. Both lose energy, which is booked as slip: the part of the contact that joins is not sheared
-// yet, and the part that leaves gives up what it held. With either rule for both directions a cycle of normal
-// and shear force creates energy (Elata & Berryman 1996, Mech. Mater. 24, 229). Over a step, with
+// k_t changes with the normal force under a sheared spring. While a grows, the spring's force is kept, so
+// that its displacement shrinks by k_t before/k_t; while a shrinks, its displacement is kept, so that its
+// force falls with k_t. Both lose energy, which is booked as slip: the part of the contact that joins is not
+// sheared yet, and the part that leaves gives up what it held. With either rule for both directions a cycle
+// of normal and shear force creates energy (Elata & Berryman 1996, Mech. Mater. 24, 229). Over a step, with
 // q = min(1, k_t before/k_t):
 //
 //   delta_t = q delta_t before + (1 + q)/2 v_t dt

@@ -38,9 +38,9 @@ struct PartList {
                   ViscousWork::Memory<T>,
                   Parts::template Memory<T>... {
     static constexpr auto list() {
-      return std::tuple_cat(Coulomb::Memory<T>::list(), Hertz::Memory<T>::list(), SofteningCoulomb::Memory<T>::list(),
-                            Viscosity::Memory<T>::list(), ViscousWork::Memory<T>::list(),
-                            Parts::template Memory<T>::list()...);
+      return std::tuple_cat(Coulomb::Memory<T>::list(), Hertz::Memory<T>::list(),
+                            SofteningCoulomb::Memory<T>::list(), Viscosity::Memory<T>::list(),
+                            ViscousWork::Memory<T>::list(), Parts::template Memory<T>::list()...);
     }
   };
   // use.operator()<Part>() for each part that remembers something.
@@ -53,9 +53,9 @@ struct PartList {
   }
   // A list of each part's memory.
   template <template <class...> class List, class T>
-  using MemoryLists =
-      std::tuple<List<Coulomb::Memory<T>>, List<Hertz::Memory<T>>, List<SofteningCoulomb::Memory<T>>, List<Viscosity::Memory<T>>,
-                 List<ViscousWork::Memory<T>>, List<typename Parts::template Memory<T>>...>;
+  using MemoryLists = std::tuple<List<Coulomb::Memory<T>>, List<Hertz::Memory<T>>,
+                                 List<SofteningCoulomb::Memory<T>>, List<Viscosity::Memory<T>>,
+                                 List<ViscousWork::Memory<T>>, List<typename Parts::template Memory<T>>...>;
 
   using General = Law<LinearOrHertz, SofteningCoulomb, Restitution, Parts...>;
   template <class L>

@@ -1,4 +1,5 @@
-// Normal force of a linear spring (Damsgaard et al. 2013, eq. 6): f_n = -k_n delta_n. Tangential stiffness k_t.
+// Normal force of a linear spring (Damsgaard et al. 2013, eq. 6): f_n = -k_n delta_n. Tangential stiffness
+// k_t.
 #pragma once
 #include "dem/law/geometry.hpp"
 #include "dem/law/part.hpp"

@@ -6,9 +6,9 @@
 //   1/m* = 1/m_i + 1/m_j (a plane: m* = m_i), masses as they resist acceleration
 //
 // beside the gamma_n that is given. The sum never pulls, so that a contact ends where its force does, before
-// the overlap does. For the linear spring zeta(e) is then that of Schwager & Poeschel (2007, Granul. Matter 9,
-// 465). For Hertz it is the same: in y = overlap^(5/4) its path v(y) is that of a linear spring, and its force
-// ends on the same line in (y, v).
+// the overlap does. For the linear spring zeta(e) is then that of Schwager & Poeschel (2007, Granul. Matter
+// 9, 465). For Hertz it is the same: in y = overlap^(5/4) its path v(y) is that of a linear spring, and its
+// force ends on the same line in (y, v).
 #pragma once
 #include <numbers>
 
@@ -25,9 +25,9 @@ struct Restitution : Viscosity {
   static constexpr bool restitutes = true;
 
   struct Parameters {
-    double zeta = 0;                      // 1; 0: no damping of this kind
+    double zeta = 0;                            // 1; 0: no damping of this kind
     double density_i = 2600, density_j = 2600;  // kg/m3, of the grains in contact; > 0
-    double least_inertia = 0;             // m, smaller grains have the mass of this radius
+    double least_inertia = 0;                   // m, smaller grains have the mass of this radius
     bool operator==(const Parameters&) const = default;
     static constexpr auto list() {
       return std::tuple{Named{"zeta", &Parameters::zeta}, Named{"density_i", &Parameters::density_i},

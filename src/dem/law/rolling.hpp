@@ -5,8 +5,8 @@
 //              couple = -R k_roll theta,   |k_roll theta| <= mu_roll f_n
 //   twisting   the same about n, with k_twist and mu_twist
 //
-// R as in hertz.hpp. mu_roll is thus the tangent of the steepest slope on which a sphere can stand, if it does
-// not slide.
+// R as in hertz.hpp. mu_roll is thus the tangent of the steepest slope on which a sphere can stand, if it
+// does not slide.
 #pragma once
 #include "dem/law/geometry.hpp"
 #include "dem/law/part.hpp"
@@ -79,8 +79,8 @@ struct Twisting {
   }
 
   template <bool ledger, class T, class Carried>
-  MORAINE_HD static Couple<T> couple(const Parameters& p, const Geometry<T>& g, const T& radius,
-                                     const T& f_n, const Vec3<T>& turn, const Carried&, Memory<T>& memory) {
+  MORAINE_HD static Couple<T> couple(const Parameters& p, const Geometry<T>& g, const T& radius, const T& f_n,
+                                     const Vec3<T>& turn, const Carried&, Memory<T>& memory) {
     const T trial = memory.twisted + dot(turn, g.n);
     const T limit = T(p.mu_twist) * f_n, size2 = T(p.k_twist * p.k_twist) * trial * trial;
     const T kept = select(size2 > limit * limit, limit / sqrt(size2), T(1)) * trial;
