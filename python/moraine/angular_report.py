@@ -63,12 +63,11 @@ class Run(study_runs.Run):
         turned = rotation.statistics(last)
         late = self.stage.snapshots[len(self.stage.snapshots) * 2 // 3:]
         contraction, at = self.contraction()
-        half_way = self.rows["shear_strain"][np.argmax(self.rows["shear_friction"] >= s.peak / 2)]
         late_rows = self.rows["shear_strain"] >= strength.late * s.strain
         settings = self.case.settings
         return {
             "packing": "loose" if self.kind.loose else "dense", "mu_roll": self.kind.mu_roll, "mu_s": self.kind.mu_s, "seed": self.seed, "sigma_0_kPa": self.sigma_0 / 1e3,
-            "grains": len(z), "strain": s.strain, "friction_peak": s.peak, "friction_peak_raw": s.peak_raw, "strain_peak": s.peak_strain, "friction_ultimate": s.ultimate, "strain_half_peak": half_way,
+            "grains": len(z), "strain": s.strain, "friction_peak": s.peak, "friction_peak_raw": s.peak_raw, "strain_peak": s.peak_strain, "friction_ultimate": s.ultimate,
             "dilation_d": s.dilation, "contraction_d": contraction, "strain_contraction": at, "porosity_0": shearing.porosity_0(self.rows), "height_0_m": self.height_0,
             "shear_zone_d": zone, "shear_zone_reach": free, "shear_zone_half_d": half, "coordination_late": self.rows["coordination"][late_rows].mean(),
             "rotation_mean_y": turned.mean[1], "rotation_variance_x": turned.variance[0], "rotation_variance_y": turned.variance[1], "rotation_variance_z": turned.variance[2],
@@ -123,7 +122,7 @@ def strength_table(rows, kinds):
 def bed_tables(rows, kinds):
     """{normal stress: lines}: what the bed does, a line for each kind."""
     keys = {"porosity_0": ("porosity before shear", 3), "contraction_d": ("contraction in stage 1 (diameters)", 4), "strain_contraction": ("to the strain", 4),
-            "dilation_d": ("dilation at the end (diameters)", 2), "strain_half_peak": ("strain at half the peak", 4), "strain_peak": ("at the peak", 3), "shear_zone_d": ("shear zone, to 5 % (diameters)", 1),
+            "dilation_d": ("dilation at the end (diameters)", 2), "strain_peak": ("strain at the peak", 3), "shear_zone_d": ("shear zone, to 5 % (diameters)", 1),
             "shear_zone_half_d": ("depth of half the displacement", 1), "shear_zone_reach": ("share of the free depth", 2), "coordination_late": ("contacts a grain, last third", 2)}
     head = ["", *(name for name, _ in keys.values())]
     return head, {sigma: [[k.label, *(shown(own, key, digits) for key, (_, digits) in keys.items())] for k in kinds if (own := of_kind(rows, k, sigma))]
@@ -160,7 +159,7 @@ def averaged(runs, of):
 def curves_figure(runs):
     """Friction and dilation at the highest stress, means over the packings, and the dilation of stage 1."""
     top, look = max(r.sigma_0 for r in runs), looks(runs)
-    figure, (over, under, first) = plt.subplots(1, 3, figsize=(page_width, 2.7), gridspec_kw={"wspace": 0.36})
+    figure, (over, under, first) = plt.subplots(1, 3, figsize=(page_width, 2.7), gridspec_kw={"wspace": 0.46})
     for kind, own in study_runs.grouped([r for r in runs if r.sigma_0 == top], lambda r: r.kind).items():
         over.plot(*averaged(own, lambda r: r.friction), **drawn_style(look[kind]))
         strain, dilation = averaged(own, lambda r: r.dilation)
@@ -173,7 +172,8 @@ def curves_figure(runs):
     low = min(line.get_ydata().min() for line in first.lines)
     first.set_ylim(1.3 * min(low, -tiny), max(0.06, -4 * low))
     first.axhline(0, color="0.6", lw=0.5, zorder=0)
-    legend(figure, look, 0.0)
+    first.set_xticks([0, early / 4, early / 2])
+    legend(figure, look, -0.06)
     for ax, letter in zip((over, under, first), "abc"):
         panel(ax, letter)
     return figure
@@ -181,7 +181,7 @@ def curves_figure(runs):
 
 def strength_figure(rows, kinds):
     """Angles by coefficient of rolling resistance, with the materials of Table 2; dilation and shear zone by the same."""
-    figure, (angles, swell, zone) = plt.subplots(1, 3, figsize=(page_width, 2.7), gridspec_kw={"wspace": 0.36})
+    figure, (angles, swell, zone) = plt.subplots(1, 3, figsize=(page_width, 2.7), gridspec_kw={"wspace": 0.42})
     sigmas = sorted({r["sigma_0_kPa"] for r in rows})
     for mu_s, fill in zip(sorted({k.mu_s for k in kinds if not k.loose}), ("full", "none")):
         own = sorted(k for k in kinds if not k.loose and k.mu_s == mu_s)
@@ -200,15 +200,15 @@ def strength_figure(rows, kinds):
                 mean, half = np.array([mean_interval(values(of_kind(rows, k, sigma), key)) for k in there]).T
                 axes.errorbar([k.mu_roll for k in there], mean, np.nan_to_num(half), color=colour, marker="o", ms=3.5, lw=0.8, fillstyle=fill, ls="-" if fill == "full" else "--",
                               label=f"{sigma:g} kPa, μ = {mu_s:g}")
-    for name, (phi_p, _, phi_u, _) in paper.materials.items():
-        if name in ("quartz sand", "glass beads"):
-            angles.axhline(phi_p, color="tab:red", lw=0.5, ls=":", zorder=0), angles.axhline(phi_u, color="tab:blue", lw=0.5, ls=":", zorder=0)
-            angles.text(1.02, (phi_p + phi_u) / 2, name.replace(" ", "\n"), fontsize=6, va="center", transform=angles.get_yaxis_transform())
+    for name, where in (("quartz sand", {"x": 0.02, "ha": "left"}), ("glass beads", {"x": 0.98, "ha": "right"})):
+        phi_p, _, phi_u, _ = paper.materials[name]
+        angles.axhline(phi_p, color="tab:red", lw=0.5, ls=":", zorder=0), angles.axhline(phi_u, color="tab:blue", lw=0.5, ls=":", zorder=0)
+        angles.text(y=phi_p + 0.3, s=name, fontsize=6, va="bottom", transform=angles.get_yaxis_transform(), **where)
     swell.axhline(paper.dilation["quartz sand"], color="0.5", lw=0.5, ls=":", zorder=0)
     swell.text(0.98, paper.dilation["quartz sand"], "quartz sand", fontsize=6, ha="right", va="bottom", transform=swell.get_yaxis_transform())
     for axes, label in ((angles, "angle of friction (°)"), (swell, "dilation (diameters)"), (zone, "depth of half the\ndisplacement (diameters)")):
-        axes.set(xlabel="coefficient of rolling resistance μ_r", ylabel=label, ylim=(0, None))
-    angles.set_ylim(0, 50)
+        axes.set(xlabel="rolling resistance $\\mu_r$", ylabel=label, ylim=(0, None))
+    angles.set_ylim(0, 52)
     swell.set_ylim(0, 2.4)
     angles.legend(fontsize=6, loc="lower right"), zone.legend(fontsize=6, loc="lower right")
     for ax, letter in zip((angles, swell, zone), "abc"):
@@ -228,7 +228,7 @@ def profiles_figure(runs):
         ax.set(xlabel="displacement over the layer's", xlim=(0, 1.02), title=f"$\\sigma_0$ = {sigma / 1e3:g} kPa")
     axes[0, 0].invert_yaxis()
     axes[0, 0].set_ylabel("depth below the wall (diameters)")
-    legend(figure, look, 0.0)
+    legend(figure, look, -0.03)
     for ax, letter in zip(axes[0], "abc"):
         panel(ax, letter)
     return figure
@@ -262,7 +262,7 @@ def rotation_figure(runs):
     free.set(xlabel="rotation about y (rad)", ylabel="density (1/rad)", yscale="log")
     with_depth.set(xlabel="mean rotation about y (rad)", ylabel="depth below the wall (diameters)")
     with_depth.invert_yaxis()
-    legend(figure, look, 0.0)
+    legend(figure, look, -0.03)
     panel(free, "a"), panel(with_depth, "b")
     return figure
 

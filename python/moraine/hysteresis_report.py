@@ -141,7 +141,7 @@ def looks(runs):
 def time_figure(runs):
     """Pressure, velocity, slip and height against time: a column for each case, a line for each packing."""
     names = list(dict.fromkeys(r.name for r in runs))
-    figure, axes = plt.subplots(4, len(names), figsize=(page_width, 5.6), sharex="col", sharey="row", squeeze=False, gridspec_kw={"hspace": 0.14, "wspace": 0.08})
+    figure, axes = plt.subplots(4, len(names), figsize=(page_width, 5.6), sharex="col", sharey="row", squeeze=False, gridspec_kw={"hspace": 0.24, "wspace": 0.08})
     for column, name in zip(axes.T, names):
         own = [r for r in runs if r.name == name]
         for r, look in zip(own, lines(len(own))):

@@ -19,6 +19,8 @@ shapes = {"uniform": "as one", "cosine": "cosine", "half": "half"}  # of the vel
 mean_share = {"uniform": 1.0, "cosine": 0.5, "half": 0.5}           # mean of the velocity over the largest
 strips = ("slow", "between", "fast")    # thirds of the way from the slowest line to the fastest
 upper = 4                               # diameters below the driven layer: the bed whose porosity is told
+times = ("early", "late")               # when it is told: about a largest strain of `early`, and in the last third
+early = 0.1
 
 
 def name_of(kind):
@@ -42,9 +44,11 @@ class Run(study_runs.Run):
     @cached_property
     def sheared(self):
         """What strength.py and dilatancy.py read: mean strain and friction over the width. What resists is weighted by the velocity, and strain
-        is that of the fastest; both over the mean share they are those of a bed that shears alike all over."""
+        is that of the fastest; both over the mean share they are those of a bed that shears alike all over. In wet beds friction is over what the
+        grains bear in the shear zone: on the wall less the pressure of the water there."""
         columns = {name: self.rows[name] for name in self.rows}
-        columns |= {"shear_strain": self.share * self.rows["shear_strain"], "shear_friction": self.rows["shear_friction"] / self.share}
+        borne = self.rows["normal_stress"] - (self.rows["water_pressure_mean"] if self.stage.wet else 0.0)
+        columns |= {"shear_strain": self.share * self.rows["shear_strain"], "shear_friction": self.rows["shear_stress"] / borne / self.share}
         return SimpleNamespace(series=Table(self.rows.file, columns, self.rows.units))
 
     @property
@@ -91,10 +95,14 @@ class Run(study_runs.Run):
         end = self.rows["stage_time"][-1]
         return [(s.stage_time / end * float(self.rows["shear_strain"][-1]), self.upper_porosity(s)[1] - self.before[1]) for s in self.stage.snapshots]
 
-    @property
-    def final_gain(self):
-        """Mean over the last third of the snapshots."""
-        return np.mean([gain for _, gain in self.gains[-len(self.late):]], axis=0)
+    def chosen(self, when):
+        """(largest strain, gain of porosity by column) of the snapshots of that time."""
+        if when == "late":
+            return self.gains[-len(self.late):]
+        return [g for g in self.gains if abs(g[0] - early) <= early / 2 + 1e-6] or self.gains[-1:]
+
+    def gain(self, when):
+        return np.mean([gain for _, gain in self.chosen(when)], axis=0)
 
     def folded(self, values, y=None):
         """Values of columns (at y, m) by distance from the slowest line (m): means of the two sides."""
@@ -103,13 +111,11 @@ class Run(study_runs.Run):
         wrapped, again = np.concatenate([y - self.side, y, y + self.side]), np.tile(values, 3)
         return away, (np.interp((self.slowest + away) % self.side, wrapped, again) + np.interp((self.slowest - away) % self.side, wrapped, again)) / 2
 
-    @cached_property
-    def local_strain(self):
-        """Of the driven layer by column: its mean displacement in the last third over the height of the bed."""
+    def local_strain(self, when):
+        """Of the driven layer by column: its mean displacement then over the height of the bed."""
         y, L = self.before[0], self.side
         share = {"uniform": np.ones(len(y)), "cosine": (1 - np.cos(2 * np.pi * y / L)) / 2, "half": np.where(y < L / 2, 1.0, 0.0)}[self.shape]
-        strains = [e for e, _ in self.gains[-len(self.late):]]
-        return share * float(np.mean(strains))
+        return share * float(np.mean([strain for strain, _ in self.chosen(when)]))
 
     def water_pressure(self):
         """By column across y, mean over the height and the last third of the snapshots, Pa."""
@@ -150,13 +156,14 @@ class Run(study_runs.Run):
 
     def measured(self):
         s, rows = strength.strength(self.sheared), self.sheared.series
-        gain, strip = self.final_gain, self.strip(self.before[0])
+        strip = self.strip(self.before[0])
         out = {"profile": self.shape, "wet": int(self.stage.wet), "seed": self.seed, "sigma_0_kPa": self.sigma_0 / 1e3, "mean_strain": rows["shear_strain"][-1],
                "friction_peak": s.peak, "friction_late": s.ultimate, "dilation_d": s.dilation, "height_0_m": self.height_0, "porosity_0": shearing.porosity_0(self.rows),
                "hours": measure.hours(self.case)}
         for k, name in enumerate(strips):
-            out |= {f"strain_{name}": self.local_strain[strip == k].mean(), f"gain_{name}": gain[strip == k].mean(), f"load_{name}": self.load(k),
-                    f"half_depth_d_{name}": self.half_depth(k)}
+            for when in times:
+                out |= {f"strain_{when}_{name}": self.local_strain(when)[strip == k].mean(), f"gain_{when}_{name}": self.gain(when)[strip == k].mean()}
+            out |= {f"load_{name}": self.load(k), f"half_depth_d_{name}": self.half_depth(k)}
         if self.stage.wet:
             y, p = self.water_pressure()
             here = np.interp(self.before[0], y, p, period=self.side)  # cells of the water are wider than columns
@@ -169,9 +176,15 @@ def load(study, note):
     return sorted(study_runs.load(study, Run, note), key=lambda r: (r.stage.wet, order.index(r.shape), r.seed))
 
 
-def basis(runs, kind):
-    """The runs whose layer moves as one, wet or dry as these; dry where there are no others."""
-    return [r for r in runs if r.kind == ("uniform", kind[1])] or [r for r in runs if r.kind == ("uniform", False)]
+def basis(runs, run):
+    """The run of the same packing whose layer moves as one, wet or dry as this; dry where there is no other, [] where there is none."""
+    alike = [r for r in runs if r.seed == run.seed and r.shape == "uniform"]
+    return [r for r in alike if r.stage.wet == run.stage.wet] or alike
+
+
+def over_alike(runs, run, when):
+    """By column: porosity gained over what a bed of the same packing gains where the layer moves as one, at the strain that it has come to there."""
+    return run.gain(when) - expected(basis(runs, run), run.local_strain(when))
 
 
 def expected(runs, strain):
@@ -194,15 +207,17 @@ def strip_table(runs, rows):
     table = []
     for kind, mine in study_runs.grouped(runs, lambda r: r.kind).items():
         own = [r for r in rows if (r["profile"], bool(r["wet"])) == kind]
-        alike = basis(runs, kind)
+        varied = [r for r in mine if r.shape != "uniform" and basis(runs, r)]
         for k, strip in enumerate(strips):
-            over = "-"
-            if kind[0] != "uniform" and alike:  # column by column, since the gain is no straight line in the strain
-                over = show(*mean_interval([(r.final_gain - expected(alike, r.local_strain))[r.strip(r.before[0]) == k].mean() for r in mine]), 4)
-            table.append([name_of(kind), strip, f"{values(own, f'strain_{strip}').mean():.2f}", shown(own, f"gain_{strip}", 4), over, shown(own, f"half_depth_d_{strip}", 2),
-                          shown(own, f"load_{strip}", 2), shown(own, f"water_kPa_{strip}", 2)])
-    return ["top layer", "strip", "strain of the layer", "porosity gained", "over that of as much strain alike", "half of the displacement (diameters)", "load over the mean",
-            "water pressure (kPa)"], table
+            line = [name_of(kind), strip]
+            for when in times:
+                over = "-"
+                if varied:
+                    over = show(*mean_interval([over_alike(runs, r, when)[r.strip(r.before[0]) == k].mean() for r in varied]), 4)
+                line += [f"{values(own, f'strain_{when}_{strip}').mean():.2f}", shown(own, f"gain_{when}_{strip}", 4), over]
+            table.append([*line, shown(own, f"half_depth_d_{strip}", 2), shown(own, f"load_{strip}", 2), shown(own, f"water_kPa_{strip}", 2)])
+    return ["top layer", "strip", *(f"{when}: {what}" for when in times for what in ("strain of the layer", "porosity gained", "over that of as much strain alike")),
+            "half of the displacement (diameters)", "load over the mean", "water pressure (kPa)"], table
 
 
 def whole_table(rows):
@@ -240,7 +255,7 @@ def maps_figure(runs):
         side, high = mine[0].side / mine[0].diameter, mine[0].last.top_wall / mine[0].diameter
         extent = (0, side, 0, high)
         a = column[0].imshow(np.nanmean(moved, axis=0).T, origin="lower", extent=extent, aspect="auto", cmap=sequential, vmin=0)
-        b = column[1].imshow(np.mean(gained, axis=0).T, origin="lower", extent=extent, aspect="auto", cmap="RdBu_r", vmin=-0.15, vmax=0.15)
+        b = column[1].imshow(np.mean(gained, axis=0).T, origin="lower", extent=extent, aspect="auto", cmap=sequential, vmin=-0.02, vmax=0.08)
         column[0].set_title(name_of(kind), fontsize=8)
         column[1].set_xlabel("y (diameters)")
     axes[0, 0].set_ylabel("z (diameters)"), axes[1, 0].set_ylabel("z (diameters)")
@@ -250,35 +265,55 @@ def maps_figure(runs):
 
 
 def across_figure(runs):
-    """Gain of porosity in the upper bed across y, beside what as much strain makes where the layer moves as one; and the water's pressure."""
+    """Gain of porosity in the upper bed across y, early and late, and what is over that which as much strain makes where the layer moves as one."""
     look = looks(runs)
-    wet = [r for r in runs if r.stage.wet]
-    figure, axes = plt.subplots(1, 3 if wet else 2, figsize=(page_width, 2.8), gridspec_kw={"wspace": 0.36})
-    for kind, own in study_runs.grouped(runs, lambda r: r.kind).items():
-        found = np.array([r.folded(r.final_gain)[1] for r in own])
-        s = own[0].folded(own[0].final_gain)[0] / own[0].diameter
-        axes[0].plot(s, found.mean(axis=0), **drawn_style(look[kind]))
-        if kind[0] != "uniform":
-            if known := basis(runs, kind):
-                alike = np.array([r.folded(expected(known, r.local_strain))[1] for r in own])
-                over = found - alike
-                axes[0].plot(s, alike.mean(axis=0), color=look[kind]["color"], lw=0.6, ls=":")
-                axes[1].plot(s, over.mean(axis=0), **drawn_style(look[kind]))
-                if len(own) > 1:
-                    half = over.std(axis=0, ddof=1) / np.sqrt(len(own))
-                    axes[1].fill_between(s, over.mean(axis=0) - half, over.mean(axis=0) + half, color=look[kind]["color"], alpha=0.2, lw=0)
-        if own[0].stage.wet:
-            pressures = [r.folded(p, y)[1] / 1e3 for r in own for y, p in [r.water_pressure()]]
-            axes[2].plot(s, np.mean(pressures, axis=0), **drawn_style(look[kind]))
-    axes[1].axhline(0, color="0.6", lw=0.5, zorder=0)
-    axes[0].set(xlabel="from the slowest line (diameters)", ylabel=f"porosity gained, upper {upper} diameters")
-    axes[1].set(xlabel="from the slowest line (diameters)", ylabel="over that of as much strain alike")
-    if wet:
-        axes[2].set(xlabel="from the slowest line (diameters)", ylabel="water pressure (kPa)")
-    handles = [plt.Line2D([], [], label=name_of(k), **drawn_style(x)) for k, x in look.items()]
-    figure.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=4)
-    for ax, letter in zip(axes, "abc"):
+    figure, axes = plt.subplots(2, 2, figsize=(page_width, 4.8), sharex=True, sharey="row", gridspec_kw={"wspace": 0.08, "hspace": 0.18})
+    for (gained, over), when in zip(axes.T, times):
+        for kind, own in study_runs.grouped(runs, lambda r: r.kind).items():
+            found = np.array([r.folded(r.gain(when))[1] for r in own])
+            s = own[0].folded(own[0].gain(when))[0] / own[0].diameter
+            gained.plot(s, found.mean(axis=0), **drawn_style(look[kind]))
+            if kind[0] == "uniform" or not all(basis(runs, r) for r in own):
+                continue
+            left = np.array([r.folded(over_alike(runs, r, when))[1] for r in own])
+            over.plot(s, left.mean(axis=0), **drawn_style(look[kind]))
+            if len(own) > 1:
+                error = left.std(axis=0, ddof=1) / np.sqrt(len(own))
+                over.fill_between(s, left.mean(axis=0) - error, left.mean(axis=0) + error, color=look[kind]["color"], alpha=0.15, lw=0)
+        over.axhline(0, color="0.6", lw=0.5, zorder=0)
+        for ax in (gained, over):
+            ax.axvline(runs[0].side / 4 / runs[0].diameter, color="0.6", lw=0.5, ls=":", zorder=0)
+        strain = np.mean([e for r in runs for e, _ in r.chosen(when)])
+        gained.set_title(f"{when}: largest strain {strain:.2f}", fontsize=8)
+        over.set_xlabel("from the slowest line (diameters)")
+    axes[0, 0].set_ylabel(f"porosity gained,\nupper {upper} diameters"), axes[1, 0].set_ylabel("over that of\nas much strain alike")
+    figure.align_ylabels()
+    legend(figure, look, 0.02)
+    for ax, letter in zip(axes.flat, "abcd"):
         panel(ax, letter)
+    return figure
+
+
+def legend(figure, look, y):
+    handles = [plt.Line2D([], [], label=name_of(k), **drawn_style(x)) for k, x in look.items()]
+    figure.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, y), ncol=min(6, len(handles)))
+
+
+def water_figure(runs):
+    """Pressure of the water across y, late: each packing a thin line, and their mean."""
+    wet = [r for r in runs if r.stage.wet]
+    if not wet:
+        raise MissingData("no run has pore water")
+    look = looks(wet)
+    figure, ax = plt.subplots(figsize=(page_width * 0.55, 2.7))
+    for kind, own in study_runs.grouped(wet, lambda r: r.kind).items():
+        pressures = np.array([r.folded(p, y)[1] / 1e3 for r in own for y, p in [r.water_pressure()]])
+        s = own[0].folded(own[0].gain("late"))[0] / own[0].diameter
+        for p in pressures:
+            ax.plot(s, p, lw=0.4, **drawn_style(look[kind]))
+        ax.plot(s, pressures.mean(axis=0), lw=1.4, **drawn_style(look[kind]))
+    ax.set(xlabel="from the slowest line (diameters)", ylabel="water pressure (kPa)")
+    legend(figure, look, -0.05)
     return figure
 
 
@@ -293,16 +328,16 @@ def curves_figure(runs):
         under.plot(strain, np.mean([r.rows["dilation"][:count] / r.diameter for r in own], axis=0), **drawn_style(look[kind]))
     over.set(xlabel="mean shear strain", ylabel="friction $\\tau/\\sigma'$", xlim=(0, None), ylim=(0, None))
     under.set(xlabel="mean shear strain", ylabel="dilation (diameters)", xlim=(0, None))
-    handles = [plt.Line2D([], [], label=name_of(k), **drawn_style(x)) for k, x in look.items()]
-    figure.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncol=4)
+    legend(figure, look, -0.04)
     panel(over, "a"), panel(under, "b")
     return figure
 
 
 captions = {
     "maps": "Displacement along x (above) and porosity gained (below) in sections across the shear at the end, means over the length of the box and the packings.",
-    "across": f"At the end, by distance from the slowest line, both sides folded: (a) porosity gained in the {upper} diameters below the driven layer; dotted: by a bed whose layer moves as one, at the strain "
-              "that the layer has come to there; (b) what is over that, shaded one standard error over the packings; (c) pressure of the water, mean over the height.",
+    "across": f"Above: porosity gained in the {upper} diameters below the driven layer, by distance from the slowest line, both sides folded onto each other; below: what is over that of a bed whose layer moves "
+              "as one, at the strain that the layer has come to there. Shaded: one standard error over the packings. Dotted line: half way, where the velocity varies most and \"half\" has its margins.",
+    "water": "Pressure of the water at the end, mean over the height, by distance from the slowest line: each packing (thin) and their mean.",
     "curves": "(a) Friction and (b) dilation against mean shear strain, means over the packings.",
     "taylor": dilatancy.caption,
 }
@@ -324,7 +359,7 @@ def build(study, output, notes=None, say=print):
                    f"{settings['model'].get('preset')}. The box is {first.side / first.diameter:.0f} diameters wide across the shear. The fastest part of the layer shears the bed at "
                    f"{first.settings['strain_rate']:g} 1/s; in \"cosine\" its velocity is u (1 - cos(2 π y/L))/2, in \"half\" that of the half at y < L/2 is u and that of the other 0. {np.nansum(values(rows, 'hours')):.2f} hours of runs. "
                    f"This report: version {made_by}, on {machine()}, {date.today()}.")
-    page.paragraph("± is half of a 95 % interval over the packings. Friction and strain are means over the width. Strips are thirds of the way from the slowest line to the fastest. Half of the displacement: how far below the driven layer grains have moved "
+    page.paragraph("± is half of a 95 % interval over the packings. Friction and strain are means over the width; in wet beds friction is over what the grains bear in the shear zone, where dilation lowers the water's pressure. Strips are thirds of the way from the slowest line to the fastest. Half of the displacement: how far below the driven layer grains have moved "
                    "half as far as it has in that strip. Load: mean pressure of the grains of the upper bed there, over that of all of them.")
     page.heading("The bed as a whole")
     page.table(*whole_table(rows))
@@ -335,7 +370,7 @@ def build(study, output, notes=None, say=print):
         page.paragraph(why)
     if notes:
         page.notes(Path(notes).read_text())
-    page.figures({"maps": lambda: maps_figure(runs), "across": lambda: across_figure(runs), "curves": lambda: curves_figure(runs), "taylor": lambda: dilatancy.figure(groups)},
+    page.figures({"maps": lambda: maps_figure(runs), "across": lambda: across_figure(runs), **({"water": lambda: water_figure(runs)} if any(r.stage.wet for r in runs) else {}), "curves": lambda: curves_figure(runs), "taylor": lambda: dilatancy.figure(groups)},
                  captions, output / "figures")
     page.write(output, "Lateral shear, with Moraine")
     say(str(output / "report.html"))

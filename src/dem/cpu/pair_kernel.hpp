@@ -98,23 +98,27 @@ inline void scatter(const Offset* at_i, const Offset* at_target, const Geometry<
   }
 }
 
-// What the law remembers of as many pairs, the first of which has this place; and no more.
-template <class L, Account account, class P>
-inline Spring<P> recalled(const PairList& list, std::size_t place) {
-  Spring<P> spring;
+// What the law remembers of as many pairs, the first of which has this place; and no more. Parts that make
+// couples are done before the others.
+enum class Parts { couples, others };
+template <class L, Account account, Parts parts, class Part>
+constexpr bool takes = L::template remembers<Part, account>&& L::template is_couple<Part> ==
+                       (parts == Parts::couples);
+
+template <class L, Account account, Parts parts, class P>
+inline void recall(Spring<P>& spring, const PairList& list, std::size_t place) {
   MoreParts::for_each_memory([&]<class Part>() {
-    if constexpr (L::template remembers<Part, account>) {
+    if constexpr (takes<L, account, parts, Part>) {
       typename Part::template Memory<P>& to = spring;
       for_each_named(to, list.of<Part>()[place / lanes],
                      [&](const char*, auto& p, const auto& group) { load_lanes(p, group, place % lanes); });
     }
   });
-  return spring;
 }
-template <class L, Account account, class P>
+template <class L, Account account, Parts parts, class P>
 inline void remember(const Spring<P>& spring, PairList& list, std::size_t place) {
   MoreParts::for_each_memory([&]<class Part>() {
-    if constexpr (L::template remembers<Part, account>) {
+    if constexpr (takes<L, account, parts, Part>) {
       const typename Part::template Memory<P>& from = spring;
       for_each_named(from, list.of<Part>()[place / lanes],
                      [&](const char*, const auto& p, auto& group) { store_lanes(p, group, place % lanes); });
@@ -142,6 +146,7 @@ template <class L, Account account, Shares shares, Lists lists, class P>
   Geometry<P> geometry[packs];
   Slide<P> slides[packs];
   Patch<L, P> patches[packs];
+  Couple<P> couples[packs];
   Vec3<P> delta_t[packs], v[packs];
   Grip<P> grips[packs];
   const auto v_c = [&](int q) -> const Vec3<P>& {
@@ -174,20 +179,30 @@ template <class L, Account account, Shares shares, Lists lists, class P>
       const Offset* const at_j = &list.pairs[later / packs_in_group].j[later % packs_in_group * P::width];
       for (int k = 0; k < P::width; ++k)
         __builtin_prefetch(&rows.grain(at_j[k]).x), __builtin_prefetch(&rows.grain(at_j[k]).omega);
-      const Spring<P> spring = recalled<L, account, P>(list, place(q));
+      Spring<P> spring;
+      recall<L, account, Parts::others>(spring, list, place(q));
       patches[q] = patch<L>(law, geometry[q]);
       if constexpr (L::rubs)
         delta_t[q] = trial_spring<L>(law, dt, geometry[q], patches[q], slides[q], spring);
       v[q] = velocity_at_step<L>(dt, v_c(q), spring);
       grips[q] = grip<L>(law, geometry[q], patches[q], v[q], delta_t[q], spring);
     }
+    if constexpr (L::couples)
+      for (int q = 0; q < block; ++q) {
+        Spring<P> spring;
+        recall<L, account, Parts::couples>(spring, list, place(q));
+        couples[q] = couples_of<L, account>(law, dt, geometry[q], patches[q],
+                                            Moved<P>{motion[q].before, slides[q]}, grips[q].f_n, spring);
+        remember<L, account, Parts::couples>(spring, list, place(q));
+      }
     for (int q = 0; q < block; ++q) {
       const PairGroup& p = group(q);
       const Geometry<P>& at = geometry[q];
-      Spring<P> spring = recalled<L, account, P>(list, place(q));
-      const Action<P> a = act<L, account>(law, dt, at, patches[q], Moved<P>{motion[q].before, slides[q]},
-                                          v_c(q), v[q], delta_t[q], grips[q], spring);
-      remember<L, account>(spring, list, place(q));
+      Spring<P> spring;
+      recall<L, account, Parts::others>(spring, list, place(q));
+      const Action<P> a =
+          act<L, account>(law, dt, at, patches[q], v_c(q), v[q], delta_t[q], grips[q], couples[q], spring);
+      remember<L, account, Parts::others>(spring, list, place(q));
       scatter<L, shares>(&p.i[lane(q)], &p.target[lane(q)], at, a, load, slot);
     }
   }

@@ -84,6 +84,12 @@ struct Law {
   }
   template <class Part>
   static constexpr bool has = (std::is_same_v<Part, More> || ...);
+  // Whether a part makes a couple.
+  template <class Part>
+  static constexpr bool is_couple = [] {
+    if constexpr (has<Part>) return Part::couples;
+    return false;
+  }();
   // Whether it reads and writes what this part remembers.
   template <class Part, Account account>
   static constexpr bool remembers = std::is_same_v<Part, Coulomb>            ? rubs
@@ -257,33 +263,38 @@ struct Moved {
   const Slide<T>& slide;
 };
 
-// The couples of rolling and twisting, with what they take.
+// The couples of rolling and twisting, with what they take; their memory is left at what it carries.
 template <class L, Account account, class P, class T, class Spring>
-MORAINE_HD void add_couples(const P& p, double dt, const Geometry<T>& g, const Patch<L, T>& patch,
-                            const Moved<T>& moved, const T& f_n, Spring& spring, Action<T>& a) {
-  const Vec3<T> turn = (T(dt) * patch.radius) * (moved.before.omega_i - moved.before.omega_j);
-  const auto carried = [&](const Vec3<T>& old, const Vec3<T>& grown) {
-    return carry(1.0, g, Slide<T>{moved.slide.n_mid, grown, moved.slide.twist}, old);
-  };
-  L::for_each_couple([&]<class Part>() {
-    typename Part::template Memory<T>& memory = spring;
-    const Couple<T> c =
-        Part::template couple<account == Account::energy>(p, g, patch.radius, f_n, turn, carried, memory);
-    a.couple += c.on_i;
-    if constexpr (account == Account::energy) a.slip = a.slip + c.slip;
-  });
+MORAINE_HD Couple<T> couples_of(const P& p, double dt, const Geometry<T>& g, const Patch<L, T>& patch,
+                                const Moved<T>& moved, const T& f_n, Spring& spring) {
+  const T zero(0);
+  Couple<T> sum{{zero, zero, zero}, zero};
+  if constexpr (L::couples) {
+    const Vec3<T> turn = (T(dt) * patch.radius) * (moved.before.omega_i - moved.before.omega_j);
+    const auto carried = [&](const Vec3<T>& old, const Vec3<T>& grown) {
+      return carry(1.0, g, Slide<T>{moved.slide.n_mid, grown, moved.slide.twist}, old);
+    };
+    L::for_each_couple([&]<class Part>() {
+      typename Part::template Memory<T>& memory = spring;
+      const Couple<T> c =
+          Part::template couple<account == Account::energy>(p, g, patch.radius, f_n, turn, carried, memory);
+      sum.on_i += c.on_i;
+      if constexpr (account == Account::energy) sum.slip = sum.slip + c.slip;
+    });
+  }
+  return sum;
 }
 
 // The forces; the spring is left at what it carries. dt = 0: no step was taken, so what slipped still slips.
 // v_c: of the step that led here, v: at its end.
 template <class L, Account account, class P, class T, class Spring>
 MORAINE_HD Action<T> act(const P& p, double dt, const Geometry<T>& g, const Patch<L, T>& patch,
-                         const Moved<T>& moved, const Vec3<T>& v_c, const Vec3<T>& v, const Vec3<T>& delta_t,
-                         const Grip<T>& grip, Spring& spring) {
+                         const Vec3<T>& v_c, const Vec3<T>& v, const Vec3<T>& delta_t, const Grip<T>& grip,
+                         const Couple<T>& couple, Spring& spring) {
   constexpr bool ledger = account == Account::energy;
   const T zero(0);
   const Vec3<T> none{zero, zero, zero};
-  Action<T> a{none, none, zero, zero, none};
+  Action<T> a{none, none, zero, zero, couple.on_i};
   const auto touching = g.delta_n < zero;
   Vec3<T> f_viscous = none;
   if constexpr (L::damps && ledger) f_viscous = L::Normal::rest(p, g, patch.at(), grip.f_n) * g.n;
@@ -313,7 +324,7 @@ MORAINE_HD Action<T> act(const P& p, double dt, const Geometry<T>& g, const Patc
     }
     spring.delta_t = kept;
     if constexpr (L::hertz) spring.a_before = patch.a;
-    if constexpr (L::couples) add_couples<L, account>(p, dt, g, patch, moved, grip.f_n, spring, a);
+    if constexpr (L::couples && ledger) a.slip = a.slip + couple.slip;
     if constexpr (L::softens) {
       const T slips = select((grip.share < T(1)) & touching, T(1), zero);
       spring.slipping = dt == 0 ? max(slips, spring.slipping) : slips;
@@ -351,8 +362,9 @@ MORAINE_HD Action<T> contact_law(const P& p, double dt, const Geometry<T>& g, co
     delta_t = trial_spring<L>(p, dt, g, at, s, spring), v_c = s.v_c;
   }
   const Vec3<T> v = velocity_at_step<L>(dt, v_c, spring);
-  return act<L, account>(p, dt, g, at, Moved<T>{before, s}, v_c, v, delta_t,
-                         grip<L>(p, g, at, v, delta_t, spring), spring);
+  const Grip<T> held = grip<L>(p, g, at, v, delta_t, spring);
+  const Couple<T> couple = couples_of<L, account>(p, dt, g, at, Moved<T>{before, s}, held.f_n, spring);
+  return act<L, account>(p, dt, g, at, v_c, v, delta_t, held, couple, spring);
 }
 
 }  // namespace moraine::dem

@@ -125,8 +125,12 @@ using CompiledLaws = std::tuple<  // between grains, at planes
     Laws<Linear<SofteningCoulomb, Undamped>, Linear<SofteningCoulomb, Viscosity>>,
     Laws<Linear<SofteningCoulomb, Viscosity>, Linear<SofteningCoulomb, Viscosity>>,
     Laws<Linear<Coulomb, Undamped, Rolling>, Linear<Frictionless, Undamped>>,
+    Laws<Linear<Coulomb, Undamped, Rolling>, Linear<Coulomb, Restitution, Rolling>>,
     Laws<Linear<Coulomb, Restitution, Rolling>, Linear<Coulomb, Restitution, Rolling>>,
+    Laws<HertzMindlin<Frictionless, Undamped>, HertzMindlin<Frictionless, Undamped>>,
     Laws<HertzMindlin<Coulomb, Undamped>, HertzMindlin<Frictionless, Undamped>>,
+    Laws<HertzMindlin<Coulomb, Undamped>, HertzMindlin<Coulomb, Restitution>>,
+    Laws<HertzMindlin<Coulomb, Undamped, Rolling>, HertzMindlin<Coulomb, Restitution, Rolling>>,
     Laws<HertzMindlin<Coulomb, Restitution>, HertzMindlin<Coulomb, Restitution>>,
     Laws<HertzMindlin<Coulomb, Restitution, Rolling>, HertzMindlin<Coulomb, Restitution, Rolling>>,
     Laws<GeneralLaw, GeneralLaw>>;
