@@ -97,6 +97,18 @@ const Kind kinds[] = {
      "bottom_pressure = { ramp = [0, 200], over = 0.09 }\nbottom_pressure_amplitude = 50\n"
      "bottom_pressure_frequency = 30\n",
      0.0625},
+    {"hertz", "[contact]\nlaw = \"hertz\"\nyoung = 7e8\nrestitution = 0.7\n",
+     "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\n", 0.0625},
+    {"rolling", "[contact]\nmu_roll = 0.2\n", "kind = \"shear\"\nnormal_stress = 2000\nstrain_rate = 1\n",
+     0.0625},
+    {"every_law_material_and_load",
+     "[grains]\nmaterial = \"clay\"\n[contact]\nlaw = \"hertz\"\nyoung = 7e8\nrestitution = 0.7\nmu_roll = "
+     "0.2\nk_roll = 5e4\nmu_twist = 0.05\ncohesion = 0.05\n[wall]\nmu_roll = 0.1\n[[material]]\nname = "
+     "\"quartz\"\nmu_s = 0.6\nmu_d = 0.3\nlayer = [\"0 m\", \"0.15 m\"]\n[[material]]\nname = "
+     "\"clay\"\ndensity = 1800\nyoung = 3e8\nmu_s = 0.2\nrestitution = 0.4\n",
+     "kind = \"shear\"\nnormal_stress = { ramp = [2000, 2500], over = 0.1 }\n"
+     "velocity = { times = [0, 0.02, 0.5], values = [0.1, 0.3, 0.1] }\n",
+     0.0625},
     {"materials",
      "[grains]\nmaterial = \"clay\"\n[[material]]\nname = \"quartz\"\nmu_s = 0.6\nmu_d = 0.3\nlayer = [\"0 "
      "m\", "
