@@ -12,7 +12,8 @@ install(TARGETS moraine RUNTIME_DEPENDENCIES
   PRE_EXCLUDE_REGEXES "^(ld-linux.*|lib(c|m|dl|rt|pthread|resolv|util|nss_.*|cuda|nvidia-.*))\\.so"
   RUNTIME DESTINATION bin LIBRARY DESTINATION lib)
 install(DIRECTORY ${UDUNITS2_TABLE}/ DESTINATION share/udunits FILES_MATCHING PATTERN "udunits2*.xml")
-install(DIRECTORY cases DESTINATION . PATTERN output EXCLUDE PATTERN sweep EXCLUDE)
+install(DIRECTORY cases DESTINATION .
+  PATTERN output EXCLUDE PATTERN sweep EXCLUDE PATTERN runs EXCLUDE PATTERN .snakemake EXCLUDE)
 install(DIRECTORY completions docs DESTINATION .)
 install(FILES README.md LICENSE CITATION.cff DESTINATION .)
 
