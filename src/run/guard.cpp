@@ -114,7 +114,9 @@ void Guard::check(const dem::State& s) {
                    dem::observe(stage_.scene, s).porosity, "; they may not bear that of ", stage_.porosity,
                    " (equal spheres come to 0.36 without friction); expected a larger porosity, less "
                    "friction, or a smaller strain_rate")
-            : ": the load or the impact is too much for contact.k_n, or the step is too long (try a smaller "
+            : ": the load or the impact is too much for the contacts' stiffness (contact.k_n; young with "
+              "Hertz's law), or the "
+              "step is too long (try a smaller "
               "model.f)");
   check_energy(s);
 }

@@ -43,10 +43,10 @@ OwnGrains read_snapshot_grains(const cases::Case& c) {
     contact.spring.delta_t = -1 / k_t * snapshot.f_t[k];
     s.contacts.push_back(contact);
   }
-  own.note =
-      text("the grains are those of a snapshot, ", c.start.filename().string(),
-           ": springs bear its tangential forces; it knows no springs at walls and no speed of the top "
-           "wall, so that the run that it comes from would go on with other bits");
+  own.note = text("the grains are those of a snapshot, ", c.start.filename().string(),
+                  ": springs bear its tangential forces; it knows no springs at walls or of rolling, and no "
+                  "speed of the top "
+                  "wall, so that the run that it comes from would go on with other bits");
   return own;
 }
 
