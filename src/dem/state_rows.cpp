@@ -140,12 +140,21 @@ void synchronise(const Scene& scene, State& s) {
 
 void change_step(Scene& scene, State& s, double dt) {
   const bool staggered = s.staggered;
+  const std::array<BodyState, body_ids> before = s.bodies;
   synchronise(scene, s);
   scene.time_0 = scene.time(s.step), scene.step_0 = s.step;
   scene.dt = dt;
   if (!staggered) return;
   half_step(scene, s, -dt);
   half_step_of_bodies(scene, s, -1);
+  // A velocity that is given is that of the step that is over, from which it may be about to jump: how it
+  // would have come here by the piece that now begins would leave the jump out of the account.
+  for (const BodyId id : {BodyId::bottom_layer, BodyId::top_layer})
+    for (int axis = 0; axis < 3; ++axis) {
+      const Drive& drive = scene.body(id).along(axis);
+      if (drive.kind == Drive::Kind::velocity && drive.changes())
+        s.at(id).v[axis] = before[static_cast<std::size_t>(id)].v[axis];
+    }
   s.staggered = true;
 }
 

@@ -121,6 +121,37 @@ TEST(Pieces, BeginAtTheFirstStepNotBeforeTheirTime) {
   EXPECT_EQ(stress_at(7), 3);
 }
 
+// What a layer gives and takes where its velocity jumps is in the ledger, though the step changes just there,
+// as dt = "auto" has it where a record falls on a jump.
+class LayerUnder : public OnEveryBackend {};
+TEST_P(LayerUnder, JumpsWhereTheStepChanges) {
+  dem::Scene scene;
+  scene.box = {1, 1, 1}, scene.gravity = 0, scene.dt = 0.01;
+  scene.body(dem::BodyId::bottom_layer) = dem::layer({}, true);
+  scene.body(dem::BodyId::top_layer) = dem::layer(dem::Drive::at(0), true);
+  dem::State state =
+      dem::grains_at_rest({0.1, 0.1, 0.1}, {{0.2, 0.2, 0.5}, {0.7, 0.2, 0.5}, {0.5, 0.7, 0.2}});
+  state.part_of = {dem::BodyId::top_layer, dem::BodyId::top_layer, dem::BodyId::bottom_layer};
+  const Histories histories{.velocity = {Between::steps, true, {0, 0.5, 1, 1.5}, {1, 0, -1, 2}}};
+  run::set_pieces(scene, histories, 0);
+  const auto engine = make();
+  engine->load(scene, state);
+  state = engine->state();
+  const double first = dem::observe(scene, state).energy.total();
+  for (const double dt : {0.005, 0.02, 0.01}) {  // each from the jump after the next half second
+    const auto steps = static_cast<std::int64_t>(std::lround(0.5 / scene.dt));
+    run::advance(*engine, scene, histories, state.step, state.step + steps);
+    state = engine->state();
+    dem::change_step(scene, state, dt);
+    engine->load(scene, state);
+    run::advance(*engine, scene, histories, state.step, state.step + 1);
+    const dem::State after = engine->state();
+    EXPECT_NEAR(dem::observe(scene, after).energy.total() - first, after.ledger.layers, 1e-12 * first);
+    engine->load(scene, state);
+  }
+}
+ON_EVERY_BACKEND(LayerUnder);
+
 class LoadTables : public Program {
  protected:
   // The small bed, consolidated and sheared by tables.
