@@ -124,12 +124,64 @@ void check_pairs(const Draft& draft, const Case& c) {
                     "; expected one for each two materials of grains");
 }
 
+// What [[material]] and [[pair]] say has to fit the law, as what [contact] and [wall] say.
+void check_law(const Draft& draft, const Case& c) {
+  const bool hertz = c.law == Case::Law::hertz;
+  const auto is_given = [&](const string& key) {
+    return !draft.entries.at(key).stated.ends_with("(by default)");
+  };
+  // Whether a stiffness of rolling or twisting comes from elsewhere than k_t: [contact], or those of a pair.
+  const auto has_own = [&](const StageDraft& one, const string& couple) {
+    const string key = "k_" + couple;
+    if (is_given("contact." + key) || is_given("contact.k_roll")) return true;
+    const auto of = one.entries.find("pair.of");
+    if (of == one.entries.end()) return false;
+    const auto& names = std::get<std::vector<string>>(of->second.value);
+    return std::all_of(names.begin(), names.end(), [&](const string& name) {
+      if (name == wall) return is_given("wall." + key) || is_given("wall.k_roll");
+      return std::any_of(draft.materials.begin(), draft.materials.end(), [&](const StageDraft& m) {
+        return m.name == name && m.entries.contains("material." + key);
+      });
+    });
+  };
+  const auto check = [&](const StageDraft& one, const string& table) {
+    const auto number = [&](const string& key) -> const Entry* {
+      const auto e = one.entries.find(table + "." + key);
+      return e == one.entries.end() ? nullptr : &e->second;
+    };
+    const auto value = [](const Entry& e) { return std::get<double>(e.value); };
+    if (const Entry* young = number("young")) {
+      if (hertz && !(value(*young) > 0))
+        throw error(young->stated, ": expected > 0 Pa with contact.law = \"hertz\"");
+      if (!hertz && value(*young) > 0)
+        throw error(young->stated, ": expected contact.law = \"hertz\", or no Young's modulus");
+    }
+    for (const string couple : {"roll", "twist"}) {
+      const Entry *mu = number("mu_" + couple), *k = number("k_" + couple);
+      if (!mu || value(*mu) == 0) continue;
+      if (k && value(*k) == 0) throw error(k->stated, ": expected > 0 N/m with mu_", couple, " > 0");
+      if (hertz && !k && !has_own(one, couple))
+        throw error(mu->stated, ": expected k_", couple,
+                    " in N/m, too: with contact.law = \"hertz\" it does not follow from k_t");
+    }
+  };
+  for (const StageDraft& m : draft.materials) check(m, "material");
+  for (const StageDraft& p : draft.pairs) check(p, "pair");
+}
+
 void check_friction(const Case& c) {
   for (const Stage& stage : c.stages) {
     dem::Scene scene;
     scene.with(dem::Material::grain).mu_s = stage.mu_s, scene.with(dem::Material::grain).mu_d = stage.mu_d;
+    dem::ContactParameters& at_wall = scene.with(dem::Material::wall);
+    at_wall.mu_s = at_wall.mu_d = stage.wall_mu;
     set_materials(c, stage, scene);
-    for (int a = 0; a < scene.materials; ++a)
+    for (int a = 0; a < scene.materials; ++a) {
+      const auto& p = scene.between(dem::Material(a), dem::Material::wall);
+      if (p.mu_d > p.mu_s)
+        throw error((c.directory / "case.toml").string(), ": stage ", stage.name, ": between ",
+                    c.materials[a].name, " and walls mu_d = ", p.mu_d,
+                    "; expected at most their mu_s = ", p.mu_s);
       for (int b = a; b < scene.materials; ++b) {
         const auto& p = scene.between(dem::Material(a), dem::Material(b));
         if (p.mu_d > p.mu_s)
@@ -137,6 +189,7 @@ void check_friction(const Case& c) {
                       c.materials[a].name, " and ", c.materials[b].name, " mu_d = ", p.mu_d,
                       "; expected at most their mu_s = ", p.mu_s);
       }
+    }
   }
 }
 
@@ -182,6 +235,7 @@ void read_materials(const Draft& draft, Case& c) {
   };
   expect_known("grains.material", c.grains.material), expect_known("wall.material", c.wall_material);
   check_pairs(draft, c);
+  check_law(draft, c);
   if (!c.materials.empty()) check_friction(c);
 }
 

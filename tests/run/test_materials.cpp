@@ -217,6 +217,22 @@ TEST_F(CaseMaterials, Refused) {
                  {"material.quartz.mu_ss=1"});
   expect_refused(two, {"between quartz and quartz mu_d = 0.9", "at most their mu_s = 0.8"}, all,
                  {"material.quartz.mu_d=0.9"});
+  expect_refused(two + "[[pair]]\nof = [\"clay\", \"wall\"]\nmu_s = 0.1\nmu_d = 0.2\n",
+                 {"between clay and walls mu_d = 0.2", "at most their mu_s = 0.1"}, all);
+  expect_refused(two, {"material.quartz.young=1e9", "expected contact.law = \"hertz\""}, all,
+                 {"material.quartz.young=1e9"});
+  const std::vector<std::string> hertz = {"contact.law=hertz", "contact.young=1e9"};
+  const auto with = [&](const std::string& key) {
+    std::vector<std::string> keys = hertz;
+    keys.push_back(key);
+    return keys;
+  };
+  expect_refused(two, {"material.quartz.young=0", "expected > 0 Pa"}, all, with("material.quartz.young=0"));
+  expect_refused(two, {"material.quartz.mu_roll=0.1", "expected k_roll in N/m", "does not follow from k_t"},
+                 all, with("material.quartz.mu_roll=0.1"));
+  std::vector<std::string> soft = with("material.quartz.mu_roll=0.1");
+  soft.push_back("material.quartz.k_roll=0");
+  expect_refused(two, {"material.quartz.k_roll=0", "expected > 0 N/m"}, all, soft);
   expect_refused(two + "[[material]]\nname = \"wall\"\n", {"expected another name"}, all);
   expect_refused(keyed(two, "clay", "sizes = [\"2 m\", \"1 m\"]"),
                  {"material.clay.sizes", "the smaller length first"}, all);
