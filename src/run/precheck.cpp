@@ -20,9 +20,10 @@ namespace {
 // A way in which contacts can swing.
 struct Mode {
   std::string what;
-  const char* damping;  // key
-  double k, gamma, w;   // N/m, N s/m, 1/kg
-  bool certain;         // that these contacts exist
+  const char* damping;      // key
+  double k, gamma, w;       // N/m, N s/m, 1/kg
+  bool certain;             // that these contacts exist
+  bool restitutes = false;  // damping comes from a coefficient of restitution, too
 };
 
 // With the stiffness and damping that the law has at the usual overlap of grains of radius r.
@@ -48,10 +49,18 @@ std::vector<Mode> modes_of(const Stage& stage, const dem::State& s, double r) {
     (wall ? of_walls : of_grains).push_back(law);
     const dem::ContactParameters p = as_springs(law, wall, r);
     modes.push_back({wall ? "along the normal of a wall" : "along the normal of two grains",
-                     wall ? "wall_gamma_n" : "gamma_n", p.k_n, p.gamma_n, bodies * w, true});
+                     wall ? "wall_gamma_n" : "gamma_n", p.k_n, p.gamma_n, bodies * w, true, law.zeta > 0});
     modes.push_back({wall ? "along a wall" : "along the tangent of two grains",
                      wall ? "wall_gamma_t" : "gamma_t", sticks(p, p.k_t), sticks(p, p.gamma_t),
                      3.5 * bodies * w, true});
+    // (R/r)^2 k against the spins of one or two grains, of 2/5 m r^2 each; R = r at a wall, r/2 at a grain.
+    const double turning = (wall ? 2.5 : 1.25) * w;
+    if (dem::Rolling::used(p))
+      modes.push_back(
+          {wall ? "rolling on a wall" : "rolling of two grains", "k_roll", p.k_roll, 0, turning, true});
+    if (dem::Twisting::used(p))
+      modes.push_back(
+          {wall ? "twisting on a wall" : "twisting of two grains", "k_twist", p.k_twist, 0, turning, true});
   };
   if (s.size() > 1)
     dem::for_each_pair_of_grains(scene, [&](const dem::ContactParameters& p) { add(p, false, 2); });
@@ -94,10 +103,12 @@ void check_step(const Stage& stage, const dem::State& s, std::vector<std::string
     // Grains with many contacts bear less than one contact; a layer on the wall is the most there can be.
     const double best = m.certain ? 0.3 * room : room;
     if (damping <= best) continue;
-    const std::string found = text(about, m.damping, " = ", m.gamma, " N s/m with a step of ", dt,
-                                   " s: damping ", m.what, of, " is ");
+    const std::string found =
+        text(about, m.damping, m.restitutes ? ", with what restitution asks for," : "", " = ", m.gamma,
+             " N s/m with a step of ", dt, " s: damping ", m.what, of, " is ");
     const std::string remedy =
-        text("; expected at most ", best / (m.w * dt), " N s/m, or a smaller model.f", heavier);
+        text("; expected at most ", best / (m.w * dt), " N s/m",
+             m.restitutes ? " (a restitution closer to 1)" : "", ", or a smaller model.f", heavier);
     if (damping >= room && m.certain && !step_too_long) throw error(found, "unstable", remedy);
     warnings.push_back(text(found, "at ", damping / room, " of its limit of stability", remedy));
   }
