@@ -227,6 +227,18 @@ void check_motion(const cases::Case& c, const Start& start, std::vector<std::str
                             c.stages[0].name, " begins at rest; zero_kinematics = false keeps them"));
 }
 
+// A bed on a slope that nothing holds slides downhill ever faster; layers hold it where it shears.
+void check_slope(const cases::Case& c, const Stage& stage, std::vector<std::string>& warnings) {
+  if (c.slope == 0 || shears(stage.kind) || !c.periodic_x || !stage.scene.has(dem::BodyId::floor)) return;
+  bool holds = false;
+  dem::for_each_pair_with_walls(stage.scene, [&](const dem::ContactParameters& p) {
+    holds |= p.mu_s > 0 && (p.k_t > 0 || p.G_star > 0);
+  });
+  if (!holds)
+    warnings.push_back(text("stage ", stage.name, ": nothing holds the bed on the slope of ", c.slope,
+                            " rad, as the floor has no friction; expected wall.k_t > 0 N/m and wall_mu > 0"));
+}
+
 void check_scaling(const cases::Case& c, const Start& start, std::vector<std::string>& warnings) {
   if (c.density_scaling == 0) return;
   const auto [smallest, largest] = std::ranges::minmax_element(start.before.state.r);
@@ -278,6 +290,7 @@ std::vector<std::string> precheck(const cases::Case& c, const Start& start, dem:
       warnings.insert(warnings.end(), foreseen.begin(), foreseen.end());
     }
     check_step(stage, s, warnings);
+    check_slope(c, stage, warnings);
     check_margin(stage, s, warnings);
     check_cells(stage, s, warnings);
     check_sides(c, stage, warnings);

@@ -167,6 +167,10 @@ TEST_F(Guards, CheckWarns) {
   };
   EXPECT_EQ(check("model.f=0.05").find("warning"), std::string::npos);
   EXPECT_NE(check("stage.shear.f=0.8").find("warning: stage shear: the step of "), std::string::npos);
+  const Outcome rolling = moraine({"check", small.string(), "--backend", "cpu", "--set", "model.dt=1e-5",
+                                   "--set", "contact.mu_roll=0.3", "--set", "contact.k_roll=1e12"});
+  EXPECT_NE(rolling.out.find("for motion rolling of two grains"), std::string::npos) << rolling.out;
+  EXPECT_NE(check("model.slope=0.1").find("warning: stage settle: nothing holds the bed"), std::string::npos);
   // The driven layer moves at 1 1/s times the height of the lattice.
   EXPECT_NE(
       check("model.neighbour_margin=1e-5").find("warning: stage shear: model.neighbour_margin = 1e-05 m"),
