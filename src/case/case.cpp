@@ -92,6 +92,8 @@ void check_case(const Entries& entries) {
     c.expect(!hertz || c.number(key) > 0, key, "> 0 Pa with contact.law = \"hertz\"");
     c.expect(hertz || c.number(key) == 0, key, "0 Pa, or contact.law = \"hertz\"");
   }
+  for (const char* key : {"contact.poisson", "wall.poisson"})
+    c.expect(hertz || c.number(key) == 0.25, key, "0.25, as if not given, or contact.law = \"hertz\"");
   for (const string table : {"contact.", "wall."})
     for (const string couple : {"roll", "twist"}) {
       const string k = table + "k_" + couple;

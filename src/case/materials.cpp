@@ -45,6 +45,13 @@ std::map<string, double> numbers_of(const StageDraft& draft, const Case& c) {
 GrainMaterial material_in(const StageDraft& draft, const Draft& all, const Case& c) {
   GrainMaterial m;
   m.name = draft.name, m.of = numbers_of(draft, c);
+  // As contact.k_roll follows contact.k_t, where neither says otherwise.
+  const auto follow = [&](const string& key, const string& other) {
+    const auto found = m.of.find(other);
+    if (found != m.of.end() && all.entries.at("contact." + key).stated.ends_with("(by default)"))
+      m.of.try_emplace(key, found->second);
+  };
+  follow("k_roll", "k_t"), follow("k_twist", "k_roll");
   for (const Key& key : keys()) {
     if (key.table() != "material." || key.type != Key::Type::number) continue;
     const string name = leaf(key.name);
@@ -281,7 +288,9 @@ void set_materials(const Case& c, const Stage& stage, dem::Scene& scene) {
     std::map<string, double> values;
     if (!c.of_walls.empty()) {
       values = between(c, own, c.of_walls[0], nullptr);
-      for (const char* viscosity : {"gamma_n", "gamma_t"}) values.erase(viscosity);  // those of [wall]
+      // Viscosities are those of [wall], and friction that of the stage, 0 while it shears: a top wall that
+      // rubs would hold the layer.
+      for (const char* key : {"gamma_n", "gamma_t", "mu_s", "mu_d"}) values.erase(key);
     }
     if (pair)
       for (const auto& [key, value] : pair->given) values[key] = value;

@@ -217,6 +217,10 @@ static Start grains_of(const cases::Case& c) {
     if (!s.before.finished)
       throw error(c.start.string(), ": the case it belongs to has not finished; run it to its end first");
     if (s.before.state.r.empty()) throw error(c.start.string(), ": has no grains");
+    const auto has_rule = [](const cases::GrainMaterial& m) { return !m.sizes.empty() || !m.layer.empty(); };
+    if (!s.before.materials.empty() && std::ranges::any_of(c.materials, has_rule))
+      s.note = text("grains keep the materials that the start names (", s.before.materials,
+                    "): material.sizes and material.layer do not count");
     s.before.rows.clear(), s.before.snapshots.clear();
     s.before.stage = 0, s.before.start.time = 0, s.before.finished = false;
     take_materials(c, s.before.state, s.before.scene, s.before.materials,

@@ -38,6 +38,7 @@ class CaseMaterials : public Program {
     dem::Scene s;
     s.with(Material::grain) = c.contact, s.with(Material::wall) = c.wall;
     s.with(Material::grain).mu_s = c.stages[stage].mu_s, s.with(Material::grain).mu_d = c.stages[stage].mu_d;
+    s.with(Material::wall).mu_s = s.with(Material::wall).mu_d = c.stages[stage].wall_mu;
     cases::set_materials(c, c.stages[stage], s);
     return s;
   }
@@ -100,10 +101,19 @@ TEST_F(CaseMaterials, WallsOfAMaterial) {
   EXPECT_EQ(c.materials.size(), 2u);  // steel is that of walls alone
   const dem::Scene s = scene(c);
   EXPECT_DOUBLE_EQ(s.between(Material::grain, Material::wall).k_n, 3e5);
-  EXPECT_DOUBLE_EQ(s.between(Material::grain, Material::wall).mu_s, 0.2);
-  EXPECT_DOUBLE_EQ(s.between(Material::grain_2, Material::wall).mu_s, 0.1);
+  EXPECT_EQ(s.between(Material::grain, Material::wall).mu_s, 0);  // stage.wall_mu: a top wall that rubs
+  EXPECT_EQ(s.between(Material::grain_2, Material::wall).mu_s, 0);
   const dem::Scene own = scene(c, 0);  // settle has viscosities of its own
   EXPECT_EQ(own.between(Material::grain, Material::wall).gamma_n, c.wall.gamma_n);
+}
+
+TEST_F(CaseMaterials, StiffnessOfRollingFollowsThatOfTheMaterial) {
+  const cases::Case c =
+      cases::load(with("c", keyed(two, "clay", "k_t = 3e4\nmu_roll = 0.2"), "material = \"clay\"\n"));
+  const dem::ContactParameters p = scene(c).between(Material::grain_2, Material::grain_2);
+  EXPECT_EQ(p.mu_roll, 0.2);
+  EXPECT_EQ(p.k_roll, 3e4);
+  EXPECT_EQ(p.k_twist, 3e4);
 }
 
 TEST_F(CaseMaterials, GrainsBySizeAndLayer) {
