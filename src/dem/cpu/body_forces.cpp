@@ -21,7 +21,7 @@ void shares(Bed& bed, Chunk& chunk, const ChunkStep& at) {
 }
 
 template <class L, Account account>
-void plane_forces(Bed& bed, Chunk& chunk, const ChunkStep& at) {
+[[gnu::flatten]] void plane_forces(Bed& bed, Chunk& chunk, const ChunkStep& at) {
   const BodyMotion& bodies = at.bodies;
   ChunkSum force[most_servos];
   for (PlanePair& p : chunk.planes) {
