@@ -6,10 +6,11 @@
 //   1/m* = 1/m_i + 1/m_j (a plane: m* = m_i), masses as they resist acceleration
 //
 // beside the gamma_n that is given. Masses are those of free grains: against a grain that is held, or a wall
-// that gives way, the true m* is another one, and e with it (0.40 for 0.3 between a free grain and a held one). The sum never pulls, so that a contact ends where its force does, before
-// the overlap does. For the linear spring zeta(e) is then that of Schwager & Poeschel (2007, Granul. Matter
-// 9, 465). For Hertz it is the same: in y = overlap^(5/4) its path v(y) is that of a linear spring, and its
-// force ends on the same line in (y, v).
+// that gives way, the true m* is another one, and e with it (0.40 for 0.3 between a free grain and a held
+// one). The sum never pulls, so that a contact ends where its force does, before the overlap does. For the
+// linear spring zeta(e) is then that of Schwager & Poeschel (2007, Granul. Matter 9, 465). For Hertz it is
+// the same: in y = overlap^(5/4) its path v(y) is that of a linear spring, and its force ends on the same
+// line in (y, v).
 #pragma once
 #include <numbers>
 
