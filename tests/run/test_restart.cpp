@@ -239,7 +239,7 @@ TEST_F(Restart, RefusesAChangedCase) {
   words.push_back("--resume");
   const Outcome o = moraine(words);
   EXPECT_EQ(o.status, 1);
-  for (const char* word : {"checkpoint.h5", "another version of this case",
+  for (const char* word : {"output/checkpoint.", "another version of this case",
                            "stage.shear.normal_stress was 2000.0 Pa and is now 3000.0 Pa", "--force"})
     EXPECT_NE(o.err.find(word), std::string::npos) << o.err;
   EXPECT_EQ(o.err.find("series_interval"), std::string::npos) << o.err;
