@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <exception>
 #include <iostream>
+#include <memory>
 #include <string_view>
 
 #include "case/case.hpp"
@@ -12,7 +13,9 @@
 #include "case/keys.hpp"
 #include "error.hpp"
 #include "memory.hpp"
+#include "ranks/ranks.hpp"
 #include "run/grain_table.hpp"
+#include "run/rank.hpp"
 #include "run/run.hpp"
 #include "run/sweep.hpp"
 
@@ -162,12 +165,16 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   exporting->add_option("--output", target, "file to write; without it the screen");
 
-  // 3. Do it, or say in one line why not.
+  // 3. Do it, or say in one line why not. Of several ranks the first does it, and the others serve it.
   if (argc == 1) {
     std::cout << overview;
     return 0;
   }
   try {
+    const std::unique_ptr<Ranks> ranks = connect_ranks();
+    if (ranks && ranks->rank() > 0) return run::serve(*ranks);
+    const run::Served served(ranks.get());
+    options.ranks = ranks.get();
     try {
       app.parse(argc, argv);
     } catch (const CLI::ParseError& e) {
@@ -183,6 +190,10 @@ int main(int argc, char** argv) {
                       : backend == "cuda" ? dem::Backend::cuda
                                           : dem::Backend::automatic;
     if (*run) run::run_case(options);
+    if (*sweep && ranks)
+      throw error(
+          "sweep: runs whole cases side by side in one process; start it without mpirun, or run one case on ",
+          ranks->size(), " ranks");
     if (*sweep) run::sweep_case(options, at_once);
     if (*check) run::check_case(options);
     if (*keys) std::cout << cases::reference(about);

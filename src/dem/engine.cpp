@@ -1,5 +1,7 @@
 #include "dem/engine.hpp"
+
 #include "backend/team.hpp"
+#include "dem/ranks/ranked_engine.hpp"
 #include "error.hpp"
 
 namespace moraine::dem {
@@ -27,7 +29,12 @@ bool cuda_device_present() {
 #endif
 }
 
-std::unique_ptr<Engine> make_engine(Backend backend, int threads) {
+std::unique_ptr<Engine> make_engine(Backend backend, int threads, Ranks* ranks) {
+  if (ranks) {
+    if (backend != Backend::cpu && backend != Backend::automatic)
+      throw error("--backend cuda: several ranks share a bed on CPUs only; use --backend cpu, or one rank");
+    return make_ranked_engine(*ranks, threads);
+  }
   if (backend == Backend::reference) return make_reference_engine(threads > 0 ? threads : available_cores());
   if (backend == Backend::automatic) backend = cuda_device_present() ? Backend::cuda : Backend::cpu;
   if (backend == Backend::cpu) return make_pair_engine(threads);

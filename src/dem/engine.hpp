@@ -10,6 +10,10 @@
 #include "dem/scene.hpp"
 #include "dem/state.hpp"
 
+namespace moraine {
+class Ranks;
+}
+
 namespace moraine::dem {
 
 class Engine {
@@ -46,9 +50,10 @@ class Engine {
 
 enum class Backend { automatic, cpu, cuda, reference };  // reference: the GPU's loop on the host
 
-// threads = 0: one for each core that this process may use, but fewer for a small bed. Throws Error where the
-// backend is not built in or has no device.
-std::unique_ptr<Engine> make_engine(Backend backend, int threads = 0);
+// threads = 0: one for each core that this process may use, but fewer for a small bed. ranks: that share the
+// bed, where there are several; this is rank 0 (ranks/ranked_engine.hpp). Throws Error where the backend is
+// not built in, has no device, or takes no ranks.
+std::unique_ptr<Engine> make_engine(Backend backend, int threads = 0, Ranks* ranks = nullptr);
 
 bool cuda_built();
 bool cuda_device_present();

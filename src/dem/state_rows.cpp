@@ -92,10 +92,9 @@ Spring<double> remembered(const Scene& scene, const ContactParameters& p, Spring
   return s;
 }
 
-void append_contact(State& s, const Scene& scene, const Sides& sides, const GrainRow& a, const GrainRow& b,
-                    Index i, Index j, const Spring<double>& spring) {
+void append_contact(State& s, const Scene& scene, const ContactParameters& p, const Sides& sides,
+                    const GrainRow& a, const GrainRow& b, Index i, Index j, const Spring<double>& spring) {
   if (!(between_grains(nearest_image(sides, a.x - b.x), a.r + b.r, a.r - b.r).delta_n < 0)) return;
-  const ContactParameters& p = scene.between(s.material_of(i), s.material_of(j));
   s.contacts.push_back({i, j, remembered(scene, p, spring)});
 }
 

@@ -31,9 +31,9 @@ void remember_velocities(const Scene& scene, State& s);
 Spring<double> remembered(const Scene& scene, const ContactParameters& p, Spring<double> spring);
 
 void append_grain(State& s, const GrainRow& grain, const LoadRow& load, BodyId part_of);
-// Only if they touch. The state has the materials of its grains.
-void append_contact(State& s, const Scene& scene, const Sides& sides, const GrainRow& a, const GrainRow& b,
-                    Index i, Index j, const Spring<double>& spring);
+// Only if they touch; p: of their materials. The state has the materials of its grains.
+void append_contact(State& s, const Scene& scene, const ContactParameters& p, const Sides& sides,
+                    const GrainRow& a, const GrainRow& b, Index i, Index j, const Spring<double>& spring);
 void append_wall_contact(State& s, const Scene& scene, const Plane& plane, const GrainRow& grain, Index i,
                          const Spring<double>& spring);
 // Sorts the contacts, stores the bodies, marks the state staggered.

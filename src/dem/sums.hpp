@@ -64,12 +64,4 @@ class ChunkSum {
   Index group_ = 0;
 };
 
-// The bed's number from those of its chunks.
-template <class Chunks, class Number>
-double sum_over_chunks(const Chunks& chunks, Number&& number) {
-  double sum = 0;
-  for (const auto& chunk : chunks) sum += number(chunk);
-  return sum;
-}
-
 }  // namespace moraine::dem

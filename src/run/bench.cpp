@@ -19,7 +19,7 @@ void bench_case(const Options& options, const std::string& stage_name, std::int6
   output::Checkpoint now = foreseen(c, index, start);
   Stage stage = prepare(c, index, start, now);
   const auto water = fill(stage, now.state, now.water, stage.goes_on);
-  const auto engine = dem::make_engine(options.backend, options.threads);
+  const auto engine = dem::make_engine(options.backend, options.threads, options.ranks);
   engine->load(stage.scene, now.state, water.get());
   steps = at_exchange(stage, steps);
   engine->advance(at_exchange(stage, std::min<std::int64_t>(100, steps)));  // warm caches and lists

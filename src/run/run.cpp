@@ -76,7 +76,7 @@ class Runner {
 
   Result run() {
     start_ = start_of(case_);  // with the engine, before anything of an earlier run is touched
-    engine_ = dem::make_engine(options_.backend, options_.threads);
+    engine_ = dem::make_engine(options_.backend, options_.threads, options_.ranks);
     warnings_ = precheck(case_, start_, *engine_);
     make_directories(files_.output);
     const output::DirectoryLock lock(files_.output);
@@ -426,6 +426,7 @@ class Runner {
 void catch_signals() {
   std::signal(SIGINT, [](int) { stop_requested = true; });
   std::signal(SIGTERM, [](int) { stop_requested = true; });
+  std::signal(SIGUSR1, [](int) { stop_requested = true; });  // mpirun passes this one on
 }
 bool stopping() { return stop_requested; }
 

@@ -15,7 +15,8 @@ struct Options {
   std::filesystem::path directory;
   std::vector<cases::Override> overrides;
   dem::Backend backend = dem::Backend::automatic;
-  int threads = 0;  // 0: all
+  int threads = 0;         // of each rank; 0: all
+  Ranks* ranks = nullptr;  // that share the bed; this is rank 0. null: there are no others
   bool resume = false, force = false, quiet = false;
   // Told every now and then: so many steps of so many of that stage are done.
   std::function<void(std::size_t stage, std::int64_t step, std::int64_t steps)> on_progress;

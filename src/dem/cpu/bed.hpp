@@ -5,7 +5,12 @@
 // from an earlier chunk to a later one, are the only traffic between owners: rows of grains one way, and the
 // other way the shares of pairs across chunks, in slots that the later chunk collects in a fixed order
 // (sums.hpp).
+//
+// Where several ranks share a bed, each has a stretch of its chunks. Grains of later ranks that its pairs
+// need are its ghosts: copies, whose rows come behind its own. Links to and from other ranks are messages
+// (traffic.hpp).
 #pragma once
+#include <algorithm>
 #include <array>
 #include <map>
 #include <vector>
@@ -15,8 +20,26 @@
 #include "dem/cpu/pair_list.hpp"
 #include "dem/sums.hpp"
 #include "dem/uses.hpp"
+#include "ranks/ranks.hpp"
 
 namespace moraine::dem::cpu {
+
+// What of a bed a rank has, and what it must know of the whole.
+struct Part {
+  Ranks* ranks = nullptr;           // null: there are no others
+  Index first = 0, all = 0;         // the first of its grains, and how many all ranks have
+  std::vector<Index> first_chunks;  // of each rank, and one after the last
+  double r_max = 0;                 // m, as the next two; see scene_check.hpp
+  double margin = 0, widest_margin = 0;
+
+  Index first_chunk() const { return ranks ? first_chunks[ranks->rank()] : 0; }
+  int rank_of_chunk(Index chunk) const {
+    return static_cast<int>(std::upper_bound(first_chunks.begin(), first_chunks.end(), chunk) -
+                            first_chunks.begin()) -
+           1;
+  }
+  static Part whole(const Scene& scene, const State& state);
+};
 
 // A pair within the neighbour margin, from which near pairs are drawn.
 struct Candidate {
@@ -39,7 +62,8 @@ struct alignas(32) WayRow {
   double unused;
 };
 
-// Slots for the pairs from one chunk to another.
+// Slots for the pairs from one chunk to another, which may be another rank's: chunks are counted from the
+// first of this rank, -1 is any of an earlier rank.
 struct Link {
   Index from, to;
   Index first, used = 0, size = 0;  // in slots
@@ -53,6 +77,7 @@ struct Outgoing {
 struct GrainPair {
   Index i, j;  // i < j
 };
+using FoundPairs = std::map<Index, std::vector<GrainPair>>;  // by the chunk of i
 
 struct alignas(64) Chunk {
   Index number, begin, end;
@@ -69,10 +94,12 @@ struct alignas(64) Chunk {
   std::vector<Index> incoming;    // links, by the chunk they come from
   Index first_link = 0;           // its own links are this one and the next ones,
   std::vector<Outgoing> outgoing;
-  std::map<Index, std::vector<GrainPair>> found;        // by its search, by the chunk of i
+  FoundPairs found;                                     // by its search
   std::vector<Index> finders;                           // chunks that have found pairs of this one
   std::array<std::vector<Index>, most_servos> members;  // its grains in each servo's layer
   Index lost = -1;                                      // a grain that went wrong
+  bool needs_ghosts = false;                            // has pairs with grains of later ranks,
+  bool has_ghosts = false;                              // has grains that are in pairs of earlier ranks
 
   // What all threads read after a step. Two, for even and odd steps: a thread may be at the next step
   // already while another still reads.
@@ -86,19 +113,27 @@ struct alignas(64) Chunk {
   Tally& at(std::int64_t step) { return tally[step & 1]; }
 };
 
+// What a step of the chunk takes, in near pairs: a grain to be moved is some 0.3 of them.
+inline double work_of(const Chunk& c) {
+  return 0.3 * (c.end - c.begin) + static_cast<double>(c.near[0].count + c.near[1].count);
+}
+
 struct Bed {
   Scene scene;
   Sides sides;
   Uses uses;
-  Index n = 0;
-  double r_max = 0, margin = 0;  // m; of the candidates
+  Part part;
+  Index n = 0;                      // grains of this rank
+  std::vector<Index> ghost_number;  // of each ghost, counted from this rank's first grain; they rise
+  double r_max = 0, margin = 0;     // m; of the candidates
   ContactOrder order{1};
   std::vector<Chunk> chunks;
   std::vector<Link> links;
-  Host::Array<BodyId> part_of;
-  std::vector<Material> material;  // as State has it
-  Host::Array<GrainRow> grain;     // n grains, then one that never touches
-  Host::Array<WayRow> searched;    // where grains were at the last search
+  std::vector<Chunk::Tally> tallies[2];  // of all ranks' chunks, as Chunk::at; empty where it has all chunks
+  std::vector<BodyId> part_of;           // with ghosts, as the next two
+  std::vector<Material> material;        // as State has it
+  Host::Array<GrainRow> grain;           // then one that never touches
+  Host::Array<WayRow> searched;          // where grains were at the last search
   double plane_searched[most_planes];
   Host::Array<LoadRow> load;  // of the last step of advance()
   Host::Array<LoadRow> slot;  // the first one is for lanes without a pair
@@ -108,15 +143,38 @@ struct Bed {
   Material material_of(Index i) const {
     return material.empty() ? Material::grain : material[static_cast<std::size_t>(i)];
   }
-  // Grains and springs of a state; neither lists nor links.
-  void load_state(const Scene& s, const State& state, const BodyMotion& bodies);
+  // A grain's number, which ghosts have whatever their row; order and chunks are by it.
+  Index number(Index row) const { return row < n ? row : ghost_number[static_cast<std::size_t>(row - n)]; }
+  Index ghosts() const { return static_cast<Index>(ghost_number.size()); }
+  Index nobody() const { return n + ghosts(); }  // the row of the one that never touches
+
+  // Grains and springs of a state; neither lists nor links. Contacts of a part have numbers of grains of
+  // later ranks beyond its own, whose rows are `ghosts`, or else those numbers and materials alone.
+  void load_state(const Scene& s, const State& state, const Part& of, const BodyMotion& bodies);
+  // Rows behind its own are these from now on.
+  struct Ghost {
+    GrainRow row;
+    Index number;
+    BodyId part_of;
+    Material material;
+  };
+  void set_ghosts(const std::vector<Ghost>& ghosts);
 };
+
+// use(tally) of each chunk of the whole bed, in their order.
+template <class Use>
+void for_each_tally(const Bed& bed, std::int64_t step, Use&& use) {
+  if (bed.tallies[0].empty())
+    for (const Chunk& chunk : bed.chunks) use(chunk.at(step));
+  else
+    for (const Chunk::Tally& tally : bed.tallies[step & 1]) use(tally);
+}
 
 // Sums over the bed.
 Reaction sum_reactions(const Bed& bed, const BodyMotion& bodies);
 Dissipation sum_dissipation(const Bed& bed, std::int64_t step);
 // Of the present step, which the motion will add up only when it comes to it; the same sums in the same
-// order.
+// order. On all ranks together.
 Dissipation pending_dissipation(const Bed& bed);
 // What each chunk's grains have moved since the search, into its tally of the step; and from these a bound,
 // m, on how far any two bodies have come closer to each other.
@@ -126,6 +184,6 @@ double approach_since_search(const Bed& bed, const BodyMotion& bodies);
 double fastest(const Bed& bed, const BodyMotion& bodies);
 
 // Throws Error where a grain is lost.
-void check_lost(Bed& bed, const BodyMotion& bodies, const std::vector<Index>& id);
+void check_lost(const Bed& bed, const BodyMotion& bodies, const std::vector<Index>& id);
 
 }  // namespace moraine::dem::cpu

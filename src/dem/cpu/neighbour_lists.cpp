@@ -19,21 +19,31 @@ constexpr int steps_foreseen = 48;
 constexpr int fewest_steps = 24, most_steps = 128;
 constexpr double least_near_margin = 1e-6;  // of the largest radius
 
-// Places in the near list of the candidates there were, asked for in the order of candidates.
+// Places in the near list of the candidates that a chunk had; j by number.
 class OldPlaces {
  public:
-  OldPlaces(const ContactOrder& order, std::vector<Candidate> old) : order_(order), old_(std::move(old)) {}
-  Index of(Index i, Index j) {
-    const auto at = [this](Index a, Index b) { return std::tuple(order_.pair(a, b), a, b); };
-    while (next_ < old_.size() && at(old_[next_].i, old_[next_].j) < at(i, j)) ++next_;
-    const bool known = next_ < old_.size() && old_[next_].i == i && old_[next_].j == j;
-    return known ? old_[next_].place : not_near;
+  OldPlaces(const Chunk& chunk, const std::vector<Candidate>& old)
+      : begin_(chunk.begin), first_(chunk.end - chunk.begin + 2) {
+    for (const Candidate& c : old)
+      if (c.place != not_near) ++first_[c.i - begin_ + 2];
+    for (std::size_t k = 2; k < first_.size(); ++k) first_[k] += first_[k - 1];
+    known_.resize(first_.back());
+    for (const Candidate& c : old)
+      if (c.place != not_near) known_[first_[c.i - begin_ + 1]++] = {c.j, c.place};
+  }
+  Index of(Index i, Index j) const {
+    for (Index k = first_[i - begin_]; k < first_[i - begin_ + 1]; ++k)
+      if (known_[k].j == j) return known_[k].place;
+    return not_near;
   }
 
  private:
-  const ContactOrder& order_;
-  std::vector<Candidate> old_;  // sorted
-  std::size_t next_ = 0;
+  struct Known {
+    Index j, place;
+  };
+  Index begin_;
+  std::vector<Index> first_;  // of each grain, in known_
+  std::vector<Known> known_;
 };
 
 template <class Work>
@@ -61,12 +71,27 @@ void find_pairs(const Bed& bed, Chunk& chunk, const CloseGrains& grains) {
   }
 }
 
+// Those that ghosts find of this rank's grains.
+FoundPairs pairs_of_ghosts(const Bed& bed, const CloseGrains& grains) {
+  FoundPairs found;
+  for (Index a = bed.n; a < bed.nobody(); ++a)
+    grains.after(grains.place(a), bed.margin, [&](Index k, double, double) {
+      const Index b = grains.grain(k);
+      if (b >= bed.n || bed.scene.never_touch(bed.part_of[a], bed.part_of[b])) return;
+      found[bed.order.chunk_of(b)].push_back({b, a});
+    });
+  return found;
+}
+
 // Pairs of one chunk that all have found, by pair of materials and (i, j).
-std::vector<GrainPair> sorted_pairs(const Bed& bed, const Chunk& chunk) {
+std::vector<GrainPair> sorted_pairs(const Bed& bed, const Chunk& chunk, const FoundPairs& by_ghosts) {
   std::vector<std::size_t> row(chunk.end - chunk.begin + 2);  // where that of i ends, two places on
+  const auto ghosts = by_ghosts.find(chunk.number);
   const auto each = [&](auto&& use) {
     for (const Index from : chunk.finders)
       for (const GrainPair& pair : bed.chunks[from].found.at(chunk.number)) use(pair, pair.i - chunk.begin);
+    if (ghosts != by_ghosts.end())
+      for (const GrainPair& pair : ghosts->second) use(pair, pair.i - chunk.begin);
   };
   each([&](const GrainPair&, Index at) { ++row[at + 2]; });
   for (std::size_t k = 2; k < row.size(); ++k) row[k] += row[k - 1];
@@ -82,38 +107,45 @@ std::vector<GrainPair> sorted_pairs(const Bed& bed, const Chunk& chunk) {
 }
 
 // Candidates of one chunk, in that order, and how many go to each later chunk.
-void take_pairs(const Bed& bed, Chunk& chunk) {
-  OldPlaces inside(bed.order, std::exchange(chunk.candidates[0], {})),
-      across(bed.order, std::exchange(chunk.candidates[1], {}));
+void take_pairs(const Bed& bed, Chunk& chunk, const FoundPairs& by_ghosts) {
+  const OldPlaces inside(chunk, chunk.candidates[0]), across(chunk, chunk.candidates[1]);
+  chunk.candidates[0].clear(), chunk.candidates[1].clear();
   chunk.outgoing.clear();
-  for (const auto& [i, j] : sorted_pairs(bed, chunk)) {
+  for (const auto& [i, j] : sorted_pairs(bed, chunk, by_ghosts)) {
     if (j < chunk.end) {
       chunk.candidates[0].push_back({i, j, no_link, inside.of(i, j)});
       continue;
     }
-    const Index to = bed.order.chunk_of(j);
+    const Index to = bed.order.chunk_of(bed.number(j));
     auto link = std::ranges::find(chunk.outgoing, to, &Outgoing::to);
     if (link == chunk.outgoing.end()) link = chunk.outgoing.insert(link, {to, 0});
     ++link->size;
-    chunk.candidates[1].push_back({i, j, static_cast<Index>(link - chunk.outgoing.begin()), across.of(i, j)});
+    chunk.candidates[1].push_back(
+        {i, j, static_cast<Index>(link - chunk.outgoing.begin()), across.of(i, bed.number(j))});
   }
 }
 
-void lay_out_links(Bed& bed) {
+// from_others: of earlier ranks, in their order.
+void lay_out_links(Bed& bed, const std::vector<Outgoing>& from_others) {
+  const auto chunks = static_cast<Index>(bed.chunks.size());
   std::int64_t slots = 1;  // the first one is for pads
   bed.links.clear();
-  for (Chunk& chunk : bed.chunks) chunk.incoming.clear();
+  const auto add = [&](Index from, const Outgoing& to) {
+    const auto link = static_cast<Index>(bed.links.size());
+    bed.links.push_back({from, to.to, static_cast<Index>(slots), 0, to.size});
+    slots += to.size;
+    if (to.to < chunks) bed.chunks[to.to].incoming.push_back(link);
+  };
+  for (Chunk& chunk : bed.chunks) chunk.incoming.clear(), chunk.needs_ghosts = chunk.has_ghosts = false;
+  for (const Outgoing& link : from_others) add(-1, link), bed.chunks[link.to].has_ghosts = true;
   for (Chunk& chunk : bed.chunks) {
     chunk.first_link = static_cast<Index>(bed.links.size());
-    for (const Outgoing& out : chunk.outgoing) {
-      bed.chunks[out.to].incoming.push_back(static_cast<Index>(bed.links.size()));
-      bed.links.push_back({chunk.number, out.to, static_cast<Index>(slots), 0, out.size});
-      slots += out.size;
-    }
+    for (const Outgoing& out : chunk.outgoing)
+      add(chunk.number, out), chunk.needs_ghosts = chunk.needs_ghosts || out.to >= chunks;
   }
-  if (std::max<std::int64_t>(bed.n + 1, slots) * row_bytes > std::numeric_limits<Offset>::max())
-    throw error("too many grains for one process: ", bed.n, " grains and ", slots,
-                " pairs across chunks; there is room for 67 million of each");
+  if (std::max<std::int64_t>(bed.nobody() + 1, slots) * row_bytes > std::numeric_limits<Offset>::max())
+    throw error("too many grains for one process: ", bed.nobody(), " grains and ", slots,
+                " pairs across chunks; there is room for 67 million of each; use more ranks");
   bed.slot.resize(slots), bed.slot_owner.resize(slots);
   clear(bed.slot);
 }
@@ -127,7 +159,7 @@ void draw_pairs(Bed& bed, Chunk& chunk, int part, double far) {
   PairList& list = chunk.spare;
   WatchList& watched = chunk.watched[part];
   list.clear(), watched.clear();
-  const auto fill_up = [&] { list.pad(chunk.begin, bed.n, part == 1 ? 0 : chunk.begin); };
+  const auto fill_up = [&] { list.pad(chunk.begin, bed.nobody(), part == 1 ? 0 : chunk.begin); };
   std::vector<Candidate>& candidates = chunk.candidates[part];
   for (std::size_t start = 0; start < candidates.size(); start += Pack::width) {
     const int used = static_cast<int>(std::min<std::size_t>(Pack::width, candidates.size() - start));
@@ -220,23 +252,36 @@ double least_gap(const Bed& bed, const WatchList& watched) {
   return l / (r2 + std::sqrt(r2 * r2 + std::max(l, 0.0)));
 }
 
-}  // namespace
-
-double find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const Control& control) {
-  const BodyMotion& bodies = control.bodies;
-  grains.sort(space, bed.scene, bed.grain.data(), bed.n, bed.margin);
+// Candidates of all chunks, their links by number of the chunk alone.
+void find_all_pairs(const Host& space, Bed& bed, const CloseGrains& grains, const BodyMotion& bodies) {
   for_each_chunk(space, bed, [&](Chunk& chunk) { find_pairs(bed, chunk, grains); });
+  const FoundPairs by_ghosts = pairs_of_ghosts(bed, grains);
   for (Chunk& chunk : bed.chunks) chunk.finders.clear();
   for (const Chunk& chunk : bed.chunks)
     for (const auto& [of, pairs] : chunk.found)
       if (!pairs.empty()) bed.chunks[of].finders.push_back(chunk.number);
   for_each_chunk(space, bed, [&](Chunk& chunk) {
-    take_pairs(bed, chunk);
+    take_pairs(bed, chunk, by_ghosts);
     find_plane_pairs(bed, chunk, bodies);
     for (Index i = chunk.begin; i < chunk.end; ++i) bed.searched.data()[i].x = bed.grain.data()[i].x;
   });
   for (int k = 0; k < bodies.planes; ++k) bed.plane_searched[k] = bodies.plane[k].place;
-  lay_out_links(bed);
+}
+
+}  // namespace
+
+double find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const Control& control,
+                       Traffic* traffic) {
+  const BodyMotion& bodies = control.bodies;
+  if (traffic) traffic->fetch_ghosts(bed);
+  on_all_ranks(bed.part.ranks, [&] {
+    grains.sort(space, bed.scene, bed.grain.data(), bed.nobody(), bed.margin);
+    find_all_pairs(space, bed, grains, bodies);
+  });
+  std::vector<Outgoing> from_others;
+  if (traffic) from_others = traffic->keep_ghosts(bed);
+  on_all_ranks(bed.part.ranks, [&] { lay_out_links(bed, from_others); });
+  if (traffic) traffic->lay_out(bed);
   const auto began = std::chrono::steady_clock::now();
   const Closing closing{control.travelled, 2 * fastest(bed, bodies) * bed.scene.dt};
   for_each_chunk(space, bed, [&](Chunk& chunk) {

@@ -12,6 +12,7 @@
 #include "dem/close_grains.hpp"
 #include "dem/control.hpp"
 #include "dem/cpu/bed.hpp"
+#include "dem/cpu/traffic.hpp"
 
 namespace moraine::dem::cpu {
 
@@ -22,8 +23,9 @@ struct Closing {
 
 // Candidates within bed.margin and near pairs of all chunks, links between chunks and their slots; springs
 // move along. Returns how long drawing the near pairs took, s. Throws Error if a coordinate is not finite, or
-// if there are too many pairs.
-double find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const Control& control);
+// if there are too many pairs. On all ranks together; traffic: null where there are no others.
+double find_candidates(const Host& space, Bed& bed, CloseGrains& grains, const Control& control,
+                       Traffic* traffic);
 
 // Draws near pairs of one chunk anew, if it is time.
 void renew_near_pairs(Bed& bed, Chunk& chunk, const Closing& closing);

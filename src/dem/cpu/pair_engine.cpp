@@ -6,16 +6,12 @@
 //   water_exchange.hpp   meeting the pore water
 //   schedule.hpp         which thread does what, when
 //   search_margin.hpp, thread_count.hpp  what follows the clock, and changes no bit
+#include "dem/cpu/pair_engine.hpp"
+
 #include <algorithm>
 #include <chrono>
-#include <memory>
-#include <optional>
 
 #include "backend/team.hpp"
-#include "dem/cpu/neighbour_lists.hpp"
-#include "dem/cpu/schedule.hpp"
-#include "dem/cpu/search_margin.hpp"
-#include "dem/cpu/thread_count.hpp"
 #include "dem/scene_check.hpp"
 #include "dem/state_rows.hpp"
 
@@ -23,74 +19,58 @@ namespace moraine::dem::cpu {
 
 namespace {
 
-class PairEngine final : public Engine {
- public:
-  explicit PairEngine(int threads) : threads_wanted_(threads), threads_(std::max(1, threads)) {}
+int default_threads(const Part& part, Index grains) {
+  // Below some 1,500 grains a thread waits longer at barriers than it works.
+  const int beside = part.ranks ? part.ranks->on_this_host() : 1;
+  return std::clamp(grains / 1500, 1, std::max(1, available_cores() / beside));
+}
 
-  void load(const Scene& scene, const State& state, FluidCoupling* fluid) override;
-  void redrive(const Scene& scene) override {
-    bed_.scene.bodies = scene.bodies;
-    control_.bodies.redrive(bed_.scene);
-  }
-  void advance(std::int64_t steps) override;
-  State state() const override;
-  Counts counts() const override;
-  std::string describe() const override;
-  int threads() const override { return threads_; }
-
- private:
-  void deal(int threads);
-  void search();
-  void start(const Scene& scene);
-
-  const int threads_wanted_;  // 0: by the number of grains
-  int threads_;               // at most
-  Host space_;
-  Bed bed_;
-  StepTasks tasks_;
-  Control control_;
-  CloseGrains grains_;
-  std::unique_ptr<Exchange> exchange_;
-  std::unique_ptr<Schedule> schedule_;
-  std::optional<SearchMargin> margin_;
-  std::optional<ThreadCount> count_;
-  std::int64_t searches_ = 0;
-  State kept_;  // what no step changes: ids, x_start, materials, bodies that do not move
-};
+}  // namespace
 
 void PairEngine::load(const Scene& scene, const State& s, FluidCoupling* fluid) {
   check_scene(scene, s);
-  kept_ = {};
-  kept_.id = s.id, kept_.x_start = s.x_start, kept_.material = s.material, kept_.bodies = s.bodies;
-  // Below some 1,500 grains a thread waits longer at barriers than it works.
-  threads_ = threads_wanted_ > 0 ? threads_wanted_ : std::clamp(s.size() / 1500, 1, available_cores());
-  control_ = {};
-  control_.bodies = motion_of(scene, s);
-  control_.water = s.water;
-  bed_ = {};
-  bed_.load_state(scene, s, control_.bodies);
-  tasks_ = tasks_for(scene);
-  exchange_ = std::make_unique<Exchange>(bed_.uses.water ? fluid : nullptr, s.water);
-  count_.emplace(threads_);
-  deal(threads_);
-  margin_.emplace(bed_.margin, scene.neighbour_margin > 0 ? bed_.margin : 0.2 * bed_.margin,
-                  std::max(bed_.margin, widest_margin(scene, s)));
-  searches_ = 0;
-  search();
-  if (s.staggered) return;
-  start(scene);
-  if (!bed_.uses.damping()) return;
+  load_part(scene, s, Part::whole(scene, s), motion_of(scene, s), {fluid, {}});
+  if (s.staggered || !bed_.uses.damping()) return;
   State begun = state();
   remember_velocities(scene, begun);
   load(scene, begun, fluid);
+}
+
+void PairEngine::load_part(const Scene& scene, const State& s, const Part& part, const BodyMotion& bodies,
+                           Water water) {
+  kept_ = {};
+  kept_.id = s.id, kept_.x_start = s.x_start, kept_.material = s.material, kept_.bodies = s.bodies;
+  threads_ = threads_wanted_ > 0 ? threads_wanted_ : default_threads(part, s.size());
+  if (!kept_.material.empty()) kept_.material.resize(s.size());  // without those of ghosts
+  control_ = {};
+  control_.bodies = bodies;
+  control_.water = s.water;
+  bed_ = {};
+  bed_.load_state(scene, s, part, control_.bodies);
+  traffic_ = part.ranks ? std::make_unique<Traffic>(*part.ranks) : nullptr;
+  if (traffic_) traffic_->share_tallies(bed_, bodies, bodies.step - 1);  // the largest speeds
+  tasks_ = tasks_for(scene);
+  exchange_ =
+      std::make_unique<Exchange>(bed_.uses.water ? water.fluid : nullptr, s.water, std::move(water.whole));
+  count_.emplace(threads_);
+  deal(threads_);
+  margin_.emplace(bed_.margin, scene.neighbour_margin > 0 ? bed_.margin : 0.2 * bed_.margin,
+                  std::max(bed_.margin, part.widest_margin));
+  searches_ = 0;
+  search();
+  if (!s.staggered) start(scene);
 }
 
 // First forces, and velocities half a step back.
 void PairEngine::start(const Scene& scene) {
   BodyMotion& bodies = control_.bodies;
   schedule_->evaluate(tasks_, bodies, 0.0);
+  if (traffic_) traffic_->share_tallies(bed_, bodies, bodies.step);
   const Reaction reaction = sum_reactions(bed_, bodies);
-  if (bed_.uses.water) exchange_->alone(bed_, bodies), control_.water = exchange_->reaction();
+  if (bed_.uses.water) {
+    on_all_ranks(bed_.part.ranks, [&] { exchange_->alone(bed_, bodies); });
+    control_.water = exchange_->reaction();
+  }
   start_half_a_step_back(scene, reaction, reaction_at(scene, control_.water, bodies.step), bodies);
   for (Index i = 0; i < bed_.n; ++i) {
     LoadRow& load = bed_.load.data()[i];
@@ -104,7 +84,7 @@ void PairEngine::start(const Scene& scene) {
 // Chunks to so many threads.
 void PairEngine::deal(int threads) {
   space_.threads = threads;
-  schedule_ = std::make_unique<Schedule>(bed_, threads);
+  schedule_ = std::make_unique<Schedule>(bed_, traffic_.get(), threads);
 }
 
 void PairEngine::search() {
@@ -114,9 +94,11 @@ void PairEngine::search() {
     times_drawn += static_cast<double>(chunk.times_drawn) / static_cast<double>(bed_.chunks.size());
   // Never so narrow that grains cross it in a step or two: what has just opened must still be a candidate.
   const double closing = 2 * fastest(bed_, control_.bodies) * bed_.scene.dt;
-  bed_.margin = std::min(std::max(margin_->margin(), 4 * closing), margin_->most());
+  const double margin = of_rank_0(bed_.part.ranks, margin_->margin());
+  bed_.margin = std::min(std::max(margin, 4 * closing), margin_->most());
   control_.travelled = 0;
-  const double drawing = find_candidates(space_, bed_, grains_, control_);
+  const double drawing = find_candidates(space_, bed_, grains_, control_, traffic_.get());
+  if (traffic_) traffic_->count_work(bed_);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   margin_->searched(seconds, drawing, times_drawn);
   ++searches_;
@@ -125,7 +107,7 @@ void PairEngine::search() {
 
 void PairEngine::advance(std::int64_t steps) {
   while (steps > 0) {
-    const std::int64_t together = std::min(steps, count_->steps_together());
+    const std::int64_t together = of_rank_0(bed_.part.ranks, std::min(steps, count_->steps_together()));
     std::int64_t left = together;
     const auto began = std::chrono::steady_clock::now();
     const Schedule::Pause pause = schedule_->run(tasks_, *exchange_, control_, left);
@@ -134,8 +116,10 @@ void PairEngine::advance(std::int64_t steps) {
     count_->ran(together - left, seconds, schedule_->interruptions());
     if (count_->now() != schedule_->threads()) deal(count_->now());
     if (pause == Schedule::Pause::done) continue;
-    check_lost(bed_, control_.bodies, kept_.id);  // of which the other pauses may come, too
-    if (pause == Schedule::Pause::failed) exchange_->rethrow();
+    on_all_ranks(bed_.part.ranks, [&] {
+      check_lost(bed_, control_.bodies, kept_.id);  // of which the other pauses may come, too
+      if (pause == Schedule::Pause::failed) exchange_->rethrow();
+    });
     search();
   }
 }
@@ -144,6 +128,7 @@ State PairEngine::state() const {
   State s = kept_;
   BodyMotion bodies = control_.bodies;
   if (!control_.closed) {
+    if (traffic_) traffic_->share_tallies(bed_, bodies, bodies.step);
     bodies.close(bed_.scene, sum_reactions(bed_, bodies),
                  reaction_at(bed_.scene, exchange_->reaction(), bodies.step));
     bodies.ledger.add(pending_dissipation(bed_));
@@ -155,7 +140,8 @@ State PairEngine::state() const {
     for (int part = 0; part < 2; ++part)
       for (const Candidate& c : chunk.candidates[part])
         if (c.place != not_near)
-          append_contact(s, bed_.scene, bed_.sides, grain[c.i], grain[c.j], c.i, c.j,
+          append_contact(s, bed_.scene, bed_.scene.between(bed_.material_of(c.i), bed_.material_of(c.j)),
+                         bed_.sides, grain[c.i], grain[c.j], c.i, bed_.number(c.j),
                          chunk.near[part].spring(c.place));
     for (const PlanePair& p : chunk.planes)
       append_wall_contact(s, bed_.scene, bodies.plane[p.plane], grain[p.i], p.i, p.spring);
@@ -186,8 +172,6 @@ std::string PairEngine::describe() const {
 #endif
   return "cpu, " + std::to_string(threads_) + (threads_ == 1 ? " thread, " : " threads, ") + set;
 }
-
-}  // namespace
 
 }  // namespace moraine::dem::cpu
 

@@ -38,6 +38,7 @@ class Worker {
          const Control& control, std::int64_t steps)
       : schedule_(schedule),
         bed_(schedule.bed_),
+        traffic_(schedule.traffic_),
         tasks_(tasks),
         exchange_(exchange),
         barrier_(barrier),
@@ -50,6 +51,7 @@ class Worker {
     for (Chunk& c : bed_.chunks)
       if (c.owner == thread) mine_.push_back(&c);
     std::stable_partition(mine_.begin(), mine_.end(), [&](const Chunk* c) { return others_wait_for(*c); });
+    std::stable_partition(mine_.begin(), mine_.end(), [](const Chunk* c) { return c->needs_ghosts; });
   }
 
   Schedule::Pause run() {
@@ -80,8 +82,17 @@ class Worker {
   bool exchanges_now() const { return bed_.uses.water && exchanges(bed_.scene, step()); }
 
   bool others_wait_for(const Chunk& c) const {
-    return std::any_of(c.outgoing.begin(), c.outgoing.end(),
-                       [&](const Outgoing& out) { return bed_.chunks[out.to].owner > thread_; });
+    return std::any_of(c.outgoing.begin(), c.outgoing.end(), [&](const Outgoing& out) {
+      return out.to < static_cast<Index>(bed_.chunks.size()) && bed_.chunks[out.to].owner > thread_;
+    });
+  }
+
+  // Totals of the step over all ranks, which all threads then find in the bed. Whether a grain is lost.
+  bool share_tallies(std::int64_t step) {
+    if (!traffic_) return false;
+    if (thread_ == 0) schedule_.lost_ = traffic_->share_tallies(bed_, control_.bodies, step);
+    barrier_.wait();
+    return schedule_.lost_;
   }
 
   // Grains and bodies to the next step, with the forces on them known; whether lists last there.
@@ -89,6 +100,7 @@ class Worker {
     const std::int64_t n = step();
     if (layer_by_stress_) {
       barrier_.wait();
+      share_tallies(n);
       move_bodies();
     }
     if (!grains_are_ahead_)
@@ -96,12 +108,14 @@ class Worker {
         move(*c, {control_.bodies, n, dt(), bed_.load.data(),
                   exchanges(bed_.scene, n) ? bed_.water.data() : nullptr});
     barrier_.wait();
+    const bool lost_elsewhere = share_tallies(n);
     if (exchange_.has_failed(n)) return Schedule::Pause::failed;
 
     if (!layer_by_stress_) move_bodies();
     if (!control_.closed) control_.bodies.ledger.add(sum_dissipation(bed_, n));
     control_.closed = false;
-    if (looks_for_lost() && std::ranges::any_of(bed_.chunks, [](const Chunk& c) { return c.lost >= 0; }))
+    if (looks_for_lost() &&
+        (lost_elsewhere || std::ranges::any_of(bed_.chunks, [](const Chunk& c) { return c.lost >= 0; })))
       return Schedule::Pause::lost;
     return lists_last() ? Schedule::Pause::done : Schedule::Pause::search;
   }
@@ -137,13 +151,35 @@ class Worker {
     // By the threads that moved them.
     const bool displaced = grains_are_ahead_;
     grains_are_ahead_ = left_ > 0 && !layer_by_stress_;
+    if (traffic_ && thread_ == 0) traffic_->begin(bed_, step());
     if (exchanges_now() && !begin_exchange(displaced)) return false;
-    for (Chunk* c : mine_) take_on(*c);
+    take_on_mine();
     finish_waiting();
     return true;
   }
 
+  // Those that need ghosts, which come first in the list, once their rows are here, so that shares are soon
+  // under way; the others in the meantime.
+  void take_on_mine() {
+    const auto ghosts_end =
+        std::ranges::partition_point(mine_, [](const Chunk* c) { return c->needs_ghosts; });
+    auto with_ghosts = mine_.begin();
+    const auto take_on_those = [&] {
+      if (with_ghosts == ghosts_end || !traffic_->has_rows(step())) return;
+      for (; with_ghosts != ghosts_end; ++with_ghosts) take_on(**with_ghosts), serve_ranks();
+    };
+    for (auto c = ghosts_end; c != mine_.end(); ++c) serve_ranks(), take_on_those(), take_on(**c);
+    for (SpinWait wait; with_ghosts != ghosts_end; wait.once()) serve_ranks(), take_on_those();
+  }
+  void serve_ranks() {
+    if (traffic_ && thread_ == 0) traffic_->progress(bed_, step());
+  }
+
   bool begin_exchange(bool displaced) {
+    if (traffic_) {
+      if (thread_ == 0) exchange_.meet(bed_, control_.bodies);
+      return true;
+    }
     if (exchange_.stale()) {
       displaced = false;
       if (!exchange_.remap(bed_, control_.bodies, thread_ == 0, barrier_)) return false;
@@ -162,6 +198,7 @@ class Worker {
     const Waiting w{&c, grains_are_ahead_ ? buffers_.take(bed_.order.chunk) - c.begin : bed_.load.data()};
     for (const ChunkTask task : tasks_.at_once) task(bed_, c, {control_.bodies, step(), dt(), w.load});
     progress.done.store(step(), std::memory_order_release);
+    if (c.needs_ghosts) traffic_->pairs_done();
     if (is_ready(c))
       complete(w);
     else
@@ -172,8 +209,10 @@ class Worker {
   // solved.
   bool is_ready(const Chunk& c) const {
     if (exchanges_now() && !exchange_.is_solved(step())) return false;
+    if (c.has_ghosts && !traffic_->has_shares(step())) return false;
     return std::all_of(c.incoming.begin(), c.incoming.end(), [&](Index l) {
-      return schedule_.progress_[bed_.links[l].from].done.load(std::memory_order_acquire) == step();
+      const Index from = bed_.links[l].from;
+      return from < 0 || schedule_.progress_[from].done.load(std::memory_order_acquire) == step();
     });
   }
 
@@ -183,23 +222,26 @@ class Worker {
     for (const ChunkTask task : tasks_.after_shares) task(bed_, c, at);
     if (exchanges_now()) {
       // To its own place where a later step may ask for it, else to a buffer.
-      const bool keep = !grains_are_ahead_ || bed_.scene.exchange_interval > 1;
+      const bool keep = traffic_ || !grains_are_ahead_ || bed_.scene.exchange_interval > 1;
       WaterRow* const push = keep ? bed_.water.data() : buffers_.push.data() - c.begin;
-      exchange_.push(bed_, c, push);
+      if (!traffic_) exchange_.push(bed_, c, push);
       at.push = push;
     }
     if (!grains_are_ahead_) return;
     move(c, at);
     // While they are in cache; the pressure of this step is solved for.
-    if (bed_.uses.water && exchanges(bed_.scene, step() + 1) && !exchange_.stale())
+    if (!traffic_ && bed_.uses.water && exchanges(bed_.scene, step() + 1) && !exchange_.stale())
       exchange_.displace(bed_, c);
     buffers_.give_back(w.load + c.begin);
   }
+
+  bool can_begin(const Chunk& c) const { return !c.needs_ghosts || traffic_->has_rows(step()); }
 
   // Chunks of its own that wait for others, and where that takes long, chunks that nobody has taken on.
   void finish_waiting() {
     std::size_t all_taken_from = bed_.chunks.size();
     for (SpinWait wait;;) {
+      serve_ranks();
       const auto ready = std::ranges::find_if(waiting_, [&](const Waiting& w) { return is_ready(*w.chunk); });
       if (ready != waiting_.end()) {
         complete(*ready);
@@ -207,9 +249,11 @@ class Worker {
         continue;
       }
       while (all_taken_from > 0 && schedule_.progress_[all_taken_from - 1].is_taken(step())) --all_taken_from;
-      if (waiting_.empty() && all_taken_from == 0) return;
+      const bool sent = !traffic_ || thread_ > 0 || traffic_->is_over(step());
+      if (waiting_.empty() && all_taken_from == 0 && sent) return;
       wait.once();
-      if (all_taken_from > 0 && wait.turns() > turns_before_help) {
+      if (all_taken_from > 0 && wait.turns() > turns_before_help &&
+          can_begin(bed_.chunks[all_taken_from - 1])) {
         take_on(bed_.chunks[all_taken_from - 1]);
         wait.start_anew();
       }
@@ -218,6 +262,7 @@ class Worker {
 
   Schedule& schedule_;
   Bed& bed_;
+  Traffic* const traffic_;
   const StepTasks& tasks_;
   Exchange& exchange_;
   Barrier& barrier_;
@@ -246,25 +291,21 @@ LoadRow* Schedule::Buffers::take(Index rows) {
 
 namespace {
 
-// What a step of the chunk takes, in near pairs: a grain to be moved is some 0.3 of them.
-double work(const Chunk& c) {
-  return 0.3 * (c.end - c.begin) + static_cast<double>(c.near[0].count + c.near[1].count);
-}
-
 // Stretches of chunks with about as much work each: chunks with large grains have many pairs.
 void deal_by_work(std::vector<Chunk>& chunks, int threads) {
   double all = 0, before = 0;
-  for (const Chunk& c : chunks) all += work(c);
+  for (const Chunk& c : chunks) all += work_of(c);
   for (Chunk& c : chunks) {
-    c.owner = std::min(threads - 1, static_cast<int>(threads * (before + 0.5 * work(c)) / all));
-    before += work(c);
+    c.owner = std::min(threads - 1, static_cast<int>(threads * (before + 0.5 * work_of(c)) / all));
+    before += work_of(c);
   }
 }
 
 }  // namespace
 
-Schedule::Schedule(Bed& bed, int threads)
+Schedule::Schedule(Bed& bed, Traffic* traffic, int threads)
     : bed_(bed),
+      traffic_(traffic),
       threads_(threads),
       progress_(std::make_unique<Progress[]>(bed.chunks.size())),
       buffers_(threads) {
@@ -293,8 +334,16 @@ Schedule::Pause Schedule::run(const StepTasks& tasks, Exchange& exchange, Contro
 void Schedule::evaluate(const StepTasks& tasks, const BodyMotion& bodies, double dt) {
   clear(bed_.load);
   const ChunkStep at{bodies, bodies.step, dt, bed_.load.data()};
-  for (Chunk& c : bed_.chunks)
+  if (traffic_) {
+    traffic_->begin(bed_, at.step);
+    for (SpinWait wait; !traffic_->has_rows(at.step); wait.once()) traffic_->progress(bed_, at.step);
+  }
+  for (Chunk& c : bed_.chunks) {
     for (const ChunkTask task : tasks.at_once) task(bed_, c, at);
+    if (c.needs_ghosts) traffic_->pairs_done();
+  }
+  if (traffic_)
+    for (SpinWait wait; !traffic_->is_over(at.step); wait.once()) traffic_->progress(bed_, at.step);
   for (Chunk& c : bed_.chunks)
     for (const ChunkTask task : tasks.after_shares) task(bed_, c, at);
 }

@@ -9,6 +9,10 @@
 // step, and begins with those that other threads wait for. It helps others only after it has waited for
 // longer than it costs to bring a chunk into another core's cache. Where that does not do, because other
 // programs want the cores, fewer threads take over (thread_count.hpp). Who does what changes no bit.
+//
+// Where several ranks share the bed, the first thread of each sends and receives between its chunks
+// (traffic.hpp). Chunks whose pairs need ghosts wait for their rows, those that earlier ranks know for these
+// ranks' shares, and all for the totals of the step.
 #pragma once
 #include <atomic>
 #include <memory>
@@ -17,6 +21,7 @@
 #include "dem/control.hpp"
 #include "dem/cpu/neighbour_lists.hpp"
 #include "dem/cpu/tasks.hpp"
+#include "dem/cpu/traffic.hpp"
 #include "dem/cpu/water_exchange.hpp"
 
 namespace moraine::dem::cpu {
@@ -25,8 +30,8 @@ class Schedule {
  public:
   enum class Pause { done, search, lost, failed };
 
-  // Deals the chunks out to so many threads.
-  Schedule(Bed& bed, int threads);
+  // Deals the chunks out to so many threads. traffic: null where there are no other ranks.
+  Schedule(Bed& bed, Traffic* traffic, int threads);
 
   // Steps until all are done, or until new candidates are needed (then control.stale, and the forces of the
   // step that it has come to are still to be done). `steps` counts down.
@@ -36,7 +41,7 @@ class Schedule {
   // How often the system took a thread off its core in the last run, for another program.
   std::int64_t interruptions() const { return interruptions_; }
 
-  // Forces of all chunks where the grains are, into bed.load; dt as in ChunkStep. One thread.
+  // Forces of all chunks where the grains are, into bed.load; dt as in ChunkStep. One thread, all ranks.
   void evaluate(const StepTasks& tasks, const BodyMotion& bodies, double dt);
 
  private:
@@ -62,10 +67,12 @@ class Schedule {
   };
 
   Bed& bed_;
+  Traffic* const traffic_;
   const int threads_;
   std::unique_ptr<Progress[]> progress_;  // by chunk
   std::vector<Buffers> buffers_;          // by thread
   std::atomic<std::int64_t> interruptions_{0};
+  bool lost_ = false;  // a grain, on some rank
 };
 
 }  // namespace moraine::dem::cpu

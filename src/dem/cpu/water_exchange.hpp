@@ -1,6 +1,9 @@
 // How the threads of the CPU's engine meet the pore water (fluid_coupling.hpp). The thread that is last to
 // say where its grains went solves for the pressure, while others go on to their pairs.
 //
+// Where several ranks share the bed, the water is that of rank 0: at an exchange it is sent the places and
+// velocities of all grains, and sends back the forces. Other threads go on to their pairs in the meantime.
+//
 // An exception that left a team of threads would end the program without a word: what the fluid throws is
 // kept until all threads have met at a barrier. A step number goes with it, for one thread may fail at the
 // next step before another has looked whether this one went well.
@@ -16,8 +19,10 @@ namespace moraine::dem::cpu {
 
 class Exchange {
  public:
-  // fluid: null where the bed is dry.
-  Exchange(FluidCoupling* fluid, const WaterReaction& last) : fluid_(fluid), reaction_(last) {}
+  // fluid: null where the bed is dry, and on all ranks but the first. whole: grains of all ranks, on rank 0
+  // where there are several and water.
+  Exchange(FluidCoupling* fluid, const WaterReaction& last, std::vector<GrainRow> whole = {})
+      : fluid_(fluid), reaction_(last), whole_(std::move(whole)) {}
 
   const WaterReaction& reaction() const { return reaction_; }  // of the last exchange
   bool stale() const { return fluid_->stale(); }
@@ -32,8 +37,11 @@ class Exchange {
   void push(const Bed& bed, const Chunk& chunk, WaterRow* push) {
     fluid_->push(chunk.number, bed.grain.data(), push);
   }
-  // All of it by one thread, with the grains at rest in between: what the pressures of the start do.
+  // All of it by one thread, with the grains at rest in between: what the pressures of the start do. Throws
+  // what the fluid throws.
   void alone(Bed& bed, const BodyMotion& bodies);
+  // The same for all ranks together, each with one thread; forces into bed.water.
+  void meet(Bed& bed, const BodyMotion& bodies);
 
   bool has_failed(std::int64_t step) const { return failed_ <= step; }
   bool has_failed() const { return failed_ != never; }
@@ -51,8 +59,12 @@ class Exchange {
   }
 
   static constexpr std::int64_t never = INT64_MAX;
+  void solve_for_all(const Bed& bed, const BodyMotion& bodies);
+
   FluidCoupling* fluid_;
   WaterReaction reaction_;
+  std::vector<GrainRow> whole_;
+  std::vector<WaterRow> push_;  // on them
   std::exception_ptr failure_;
   std::atomic<std::int64_t> failed_{never};
   std::atomic<int> displaced_{0};         // threads that have, at the present exchange

@@ -134,7 +134,8 @@ class GatherEngine final : public Engine {
     for (Index i = 0; i < n_; ++i) {
       for (std::int64_t k = row[i]; k < row[i + 1]; ++k)
         if (const Index j = neighbour[k]; j > i)
-          append_contact(s, view_.scene, view_.sides, grains[i], grains[j], i, j, spring[k]);
+          append_contact(s, view_.scene, view_.scene.between(s.material_of(i), s.material_of(j)), view_.sides,
+                         grains[i], grains[j], i, j, spring[k]);
       if (!meets_planes(view_.scene, kept_.part_of[i])) continue;
       for (int p = 0; p < bodies.planes; ++p)
         append_wall_contact(s, view_.scene, bodies.plane[p], grains[i], i,
