@@ -2,6 +2,8 @@
 #include <cstring>
 
 #include "backends.hpp"
+#include "dem/sums.hpp"
+#include "thread_ranks.hpp"
 #include "wet_scenes.hpp"
 
 namespace moraine::coupling {
@@ -63,6 +65,24 @@ TEST(SameBitsInWater, ForAnyThreadsAndOnTheGpusLoop) {
     expect_same(one, after(WetRun(bed, w, {}, dem::Backend::cpu, many), steps));
     for (const dem::Backend backend : gpu_loops())
       expect_same(one, after(WetRun(bed, w, {}, backend, 2), steps));
+  }
+}
+
+TEST(SameBitsInWater, ForAnyRanks) {
+  for (const auto& [m, damped, graded] : kinds) {
+    const WetBed bed = sheared(damped, graded);
+    Water w = water_over(bed);
+    w.interval = m, w.k_c = graded ? 0 : 1e-11;
+    if (graded) w.cells = {3, 3, 2};
+    const int steps = graded ? 150 : 600;
+    const End one = after(WetRun(bed, w), steps);
+    for (const int ranks : {2, 3}) {
+      if (ranks > dem::chunk_count(bed.state.size())) continue;
+      EngineOnRanks engine(ranks, ranks % 2 + 1);
+      const WetRun run(bed, w, *engine);
+      engine->advance((steps + m - 1) / m * m);
+      expect_same(one, {engine->state(), run.water->state()});
+    }
   }
 }
 

@@ -206,6 +206,12 @@ struct WetRun {
   std::unique_ptr<PoreWater> water;
   std::unique_ptr<dem::Engine> engine;
 
+  // In an engine that another keeps.
+  WetRun(const WetBed& bed, const Water& w, dem::Engine& in)
+      : scene(bed.scene), water(make_pore_water(w, bed.scene, bed.state, {}, false)) {
+    scene.exchange_interval = water->interval();
+    in.load(scene, bed.state, water.get());
+  }
   WetRun(const WetBed& bed, const Water& w, const WaterState& before = {},
          dem::Backend backend = dem::Backend::cpu, int threads = 1)
       : scene(bed.scene),

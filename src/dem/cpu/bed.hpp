@@ -164,7 +164,7 @@ struct Bed {
 // use(tally) of each chunk of the whole bed, in their order.
 template <class Use>
 void for_each_tally(const Bed& bed, std::int64_t step, Use&& use) {
-  if (bed.tallies[0].empty())
+  if (!bed.part.ranks)
     for (const Chunk& chunk : bed.chunks) use(chunk.at(step));
   else
     for (const Chunk::Tally& tally : bed.tallies[step & 1]) use(tally);

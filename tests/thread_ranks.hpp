@@ -1,0 +1,116 @@
+// Ranks (src/ranks/ranks.hpp) that are threads of one process, to test what several ranks do without MPI.
+#pragma once
+#include <array>
+#include <cstring>
+#include <deque>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+#include <tuple>
+#include <vector>
+
+#include "dem/ranks/ranked_engine.hpp"
+
+namespace moraine {
+
+// Messages on their way, by where they come from, where they go, and tag.
+class PostOffice {
+ public:
+  using Key = std::tuple<int, int, Tag>;
+  void put(const Key& key, const void* bytes, std::size_t count) {
+    const auto* first = static_cast<const std::byte*>(bytes);
+    const std::lock_guard held(mutex_);
+    boxes_[key].emplace_back(first, first + count);
+    ++messages_;
+  }
+  bool take(const Key& key, void* bytes, std::size_t most, std::size_t& count) {
+    const std::lock_guard held(mutex_);
+    auto& box = boxes_[key];
+    if (box.empty()) return false;
+    count = box.front().size();
+    if (count > most)
+      throw std::logic_error("a message of tag " + std::to_string(int(std::get<2>(key))) + " has " +
+                             std::to_string(count) + " bytes, " + std::to_string(most) + " were expected");
+    std::memcpy(bytes, box.front().data(), count);
+    box.pop_front();
+    return true;
+  }
+  bool empty() {
+    const std::lock_guard held(mutex_);
+    for (const auto& [key, box] : boxes_)
+      if (!box.empty()) return false;
+    return true;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::map<Key, std::deque<std::vector<std::byte>>> boxes_;
+  std::int64_t messages_ = 0;
+};
+
+class ThreadRank final : public Ranks {
+ public:
+  ThreadRank(PostOffice& office, int rank, int size) : office_(office), rank_(rank), size_(size) {}
+  int rank() const override { return rank_; }
+  int size() const override { return size_; }
+  int on_this_host() const override { return size_; }
+  Message send(int to, Tag tag, const void* bytes, std::size_t count) override {
+    office_.put({rank_, to, tag}, bytes, count);
+    return {};
+  }
+  Message receive(int from, Tag tag, void* bytes, std::size_t most) override {
+    expected_.push_back({{from, rank_, tag}, bytes, most, ++last_});
+    return {last_, 0};
+  }
+  bool done(Message& message) override {
+    for (std::size_t k = 0; k < expected_.size(); ++k) {
+      if (expected_[k].request != message.request) continue;
+      const Expected& e = expected_[k];
+      if (!office_.take(e.key, e.bytes, e.most, message.bytes)) return false;
+      expected_.erase(expected_.begin() + static_cast<std::ptrdiff_t>(k));
+      message.request = 0;
+      break;
+    }
+    return true;
+  }
+  void abort(const std::string& words) override { throw std::logic_error("rank aborts: " + words); }
+
+ private:
+  struct Expected {
+    PostOffice::Key key;
+    void* bytes;
+    std::size_t most;
+    std::uintptr_t request;
+  };
+  PostOffice& office_;
+  int rank_, size_;
+  std::vector<Expected> expected_;
+  std::uintptr_t last_ = 0;
+};
+
+// The first rank's engine, with threads that serve as the others.
+class EngineOnRanks {
+ public:
+  EngineOnRanks(int ranks, int threads) {
+    for (int r = 0; r < ranks; ++r) ranks_.push_back(std::make_unique<ThreadRank>(office_, r, ranks));
+    for (int r = 1; r < ranks; ++r) serving_.emplace_back([this, r] { dem::serve(*ranks_[r]); });
+    engine_ = dem::make_ranked_engine(*ranks_[0], threads);
+  }
+  ~EngineOnRanks() {
+    dem::dismiss(*ranks_[0]);
+    for (std::thread& t : serving_) t.join();
+  }
+  dem::Engine& operator*() const { return *engine_; }
+  dem::Engine* operator->() const { return engine_.get(); }
+  bool all_have_come() { return office_.empty(); }  // whether no message was sent for nothing
+
+ private:
+  PostOffice office_;
+  std::vector<std::unique_ptr<ThreadRank>> ranks_;
+  std::vector<std::thread> serving_;
+  std::unique_ptr<dem::Engine> engine_;
+};
+
+}  // namespace moraine
