@@ -55,6 +55,11 @@ Error wrong_words(CLI::App& app, const std::string& first, const CLI::ParseError
   const auto left = where.remaining();
   for (const std::string& word : left) {
     if (!word.starts_with('-')) continue;
+    if (word.starts_with("--ranks"))
+      return error(
+          "--ranks: an option of the launcher, ./moraine, in the folder of the sources; else start it by "
+          "mpirun: "
+          "mpirun -n 8 moraine run CASE");
     std::vector<std::string> options;
     if (chosen.empty()) options.push_back("--cuda");  // of the launcher
     for (const CLI::Option* option : where.get_options())
