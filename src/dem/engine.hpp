@@ -42,6 +42,9 @@ class Engine {
     std::int64_t near = 0;        // pairs evaluated at each step
     std::int64_t rebuilds = 0;    // of the candidates
     double search_seconds = 0;    // that these took, where the engine times them
+    std::int64_t ghosts = 0;      // copies of grains that ranks have of each other's
+    std::int64_t bytes_sent = 0;  // by ranks to each other in steps, so far
+    double most_work = 1;         // of a rank, over the mean; in pairs, at the last search
   };
   virtual Counts counts() const = 0;
   virtual std::string describe() const = 0;  // e.g. "cpu, 2 threads, AVX2"

@@ -157,6 +157,8 @@ Engine::Counts PairEngine::counts() const {
       c.near += chunk.near[part].count;
       c.candidates += static_cast<std::int64_t>(chunk.candidates[part].size());
     }
+  c.ghosts = bed_.ghosts();
+  if (traffic_) c.bytes_sent = static_cast<std::int64_t>(traffic_->bytes_sent());
   return c;
 }
 

@@ -189,10 +189,4 @@ void Traffic::count_work(const Bed& bed) {
   work_ = of_all(ranks_, mine);
 }
 
-std::size_t Traffic::rows_sent() const {
-  std::size_t rows = 0;
-  for (const Earlier& e : earlier_) rows += e.wanted.size();
-  return rows;
-}
-
 }  // namespace moraine::dem::cpu

@@ -47,7 +47,6 @@ class Traffic {
   bool share_tallies(Bed& bed, const BodyMotion& bodies, std::int64_t step);
   void count_work(const Bed& bed);  // all ranks together
 
-  std::size_t rows_sent() const;                          // in a step
   std::size_t bytes_sent() const { return bytes_sent_; }  // so far, of rows and shares
 
  private:

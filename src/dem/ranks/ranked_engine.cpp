@@ -109,8 +109,12 @@ class RankedEngine final : public Engine {
     Counts sum{.rebuilds = own.rebuilds, .search_seconds = own.search_seconds};
     together([&] {
       tell(ranks_, Order::counts);
-      for (const Counts& c : of_all(ranks_, own)) sum.candidates += c.candidates, sum.near += c.near;
+      for (const Counts& c : of_all(ranks_, own)) {
+        sum.candidates += c.candidates, sum.near += c.near;
+        sum.ghosts += c.ghosts, sum.bytes_sent += c.bytes_sent;
+      }
     });
+    sum.most_work = unevenness();
     return sum;
   }
   std::string describe() const override {
@@ -154,12 +158,17 @@ class RankedEngine final : public Engine {
     loaded_ = true;
   }
 
-  // Deals chunks out again, where that would bring ranks nearer together.
-  void share_anew() {
+  // The largest work of a rank over the mean.
+  double unevenness() const {
     const std::vector<double>& work = part_.engine().work();
     double all = 0;
     for (const double w : work) all += w;
-    const double uneven = *std::ranges::max_element(work) * ranks_.size() / all;
+    return *std::ranges::max_element(work) * ranks_.size() / all;
+  }
+
+  // Deals chunks out again, where that would bring ranks nearer together.
+  void share_anew() {
+    const double uneven = unevenness();
     if (uneven < 1.1 || uneven < 1.05 * tried_at_) return;
     tried_at_ = uneven;
     const State now = state();
