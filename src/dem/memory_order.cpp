@@ -1,6 +1,7 @@
 #include "dem/memory_order.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <tuple>
 
@@ -26,7 +27,8 @@ void turn_round(Spring<double>& spring) {
 
 class Halving {
  public:
-  Halving(const Sides& sides, const State& state) : sides_(sides), state_(state) {}
+  Halving(const Sides& sides, const std::vector<Vec3d>& x, const std::vector<Index>& id)
+      : sides_(sides), x_(x), id_(id) {}
 
   // Orders the grains [begin, end) of the list.
   void operator()(Index* begin, Index* end, Index chunk) const {
@@ -36,7 +38,7 @@ class Halving {
     Index* const middle = begin + std::clamp<Index>(whole, 1, n - 1);
     const int axis = longest(begin, end);
     std::nth_element(begin, middle, end, [&](Index a, Index b) {
-      return std::pair(state_.x[a][axis], state_.id[a]) < std::pair(state_.x[b][axis], state_.id[b]);
+      return std::pair(x_[a][axis], id_[a]) < std::pair(x_[b][axis], id_[b]);
     });
     (*this)(begin, middle, chunk), (*this)(middle, end, chunk);
   }
@@ -48,9 +50,9 @@ class Halving {
     int axis = 0;
     double most = -1;
     for (int a = 0; a < 3; ++a) {
-      double low = state_.x[*begin][a], high = low;
+      double low = x_[*begin][a], high = low;
       for (const Index* i = begin; i != end; ++i)
-        low = std::min(low, state_.x[*i][a]), high = std::max(high, state_.x[*i][a]);
+        low = std::min(low, x_[*i][a]), high = std::max(high, x_[*i][a]);
       double length = high - low;
       if (length > 0.9 * sides_.side[a] && sides_.side[a] > 0) length *= 0.4;
       if (length > most) axis = a, most = length;
@@ -59,41 +61,81 @@ class Halving {
   }
 
   const Sides& sides_;
-  const State& state_;
+  const std::vector<Vec3d>& x_;  // m, in the box
+  const std::vector<Index>& id_;
 };
+
+struct Order {
+  std::vector<Index> row;    // by new place
+  std::vector<Index> place;  // by present row
+};
+
+// m, whole boxes that a place is away along periodic sides.
+Vec3d boxes_beyond(const Sides& sides, const Vec3d& x) {
+  Vec3d shift{0, 0, 0};
+  for (int a = 0; a < 3; ++a)
+    if (sides.side[a] > 0) shift[a] = sides.side[a] * std::floor(x[a] * sides.inverse[a]);
+  return shift;
+}
+
+// x: m, in the box.
+Order spatial_order(const Sides& sides, const std::vector<Vec3d>& x, const std::vector<Index>& id) {
+  const auto n = static_cast<Index>(x.size());
+  Order order{std::vector<Index>(n), std::vector<Index>(n)};
+  std::iota(order.row.begin(), order.row.end(), 0);
+  std::sort(order.row.begin(), order.row.end(), [&](Index a, Index b) { return id[a] < id[b]; });
+  Halving{sides, x, id}(order.row.data(), order.row.data() + n, chunk_size(n));
+  for (Index k = 0; k < n; ++k) order.place[order.row[k]] = k;
+  return order;
+}
+
+void take(const Order& order, State& s, std::vector<Vec3d>* also = nullptr) {
+  const auto permute = [&](auto& v) {
+    if (v.empty()) return;
+    auto sorted = v;
+    for (std::size_t k = 0; k < v.size(); ++k) sorted[k] = v[order.row[k]];
+    v = std::move(sorted);
+  };
+  permute(s.id), permute(s.r), permute(s.x), permute(s.v), permute(s.omega), permute(s.rotation);
+  permute(s.force), permute(s.torque), permute(s.water_force), permute(s.x_start), permute(s.part_of);
+  permute(s.material);
+  if (also) permute(*also);
+  for (Contact& c : s.contacts) {
+    c.i = order.place[c.i], c.j = order.place[c.j];
+    if (c.i > c.j) std::swap(c.i, c.j), turn_round(c.spring);
+  }
+  for (WallContact& w : s.wall_contacts) w.i = order.place[w.i];
+  sort_contacts(s);
+}
 
 }  // namespace
 
 void sort_spatially(const Scene& scene, State& s) {
-  const Index n = s.size();
   const Sides sides = Sides::of(scene);
-  for (Index i = 0; i < n; ++i)
-    for (int a = 0; a < 3; ++a)
-      if (sides.side[a] > 0) {
-        const double shift = sides.side[a] * std::floor(s.x[i][a] * sides.inverse[a]);
-        s.x[i][a] -= shift, s.x_start[i][a] -= shift;
-      }
-
-  std::vector<Index> order(n), place(n);
-  std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](Index a, Index b) { return s.id[a] < s.id[b]; });
-  Halving{sides, s}(order.data(), order.data() + n, chunk_size(n));
-  for (Index k = 0; k < n; ++k) place[order[k]] = k;
-
-  const auto permute = [&](auto& v) {
-    auto sorted = v;
-    for (Index k = 0; k < n; ++k) sorted[k] = v[order[k]];
-    v = std::move(sorted);
-  };
-  permute(s.id), permute(s.r), permute(s.x), permute(s.v), permute(s.omega), permute(s.rotation);
-  permute(s.force), permute(s.torque), permute(s.x_start), permute(s.part_of);
-  if (!s.material.empty()) permute(s.material);
-  for (Contact& c : s.contacts) {
-    c.i = place[c.i], c.j = place[c.j];
-    if (c.i > c.j) std::swap(c.i, c.j), turn_round(c.spring);
+  for (Index i = 0; i < s.size(); ++i) {
+    const Vec3d shift = boxes_beyond(sides, s.x[i]);
+    s.x[i] -= shift, s.x_start[i] -= shift;
   }
-  for (WallContact& w : s.wall_contacts) w.i = place[w.i];
-  sort_contacts(s);
+  take(spatial_order(sides, s.x, s.id), s);
+}
+
+bool renew_order(const Scene& scene, State& s, double lost, std::vector<Vec3d>* also) {
+  const Sides sides = Sides::of(scene);
+  std::vector<Vec3d> x = s.x;
+  for (Vec3d& at : x) {
+    at -= boxes_beyond(sides, at);
+    if (!std::isfinite(at.x + at.y + at.z)) return false;  // for others to tell
+  }
+  const Order order = spatial_order(sides, x, s.id);
+  const Index chunk = chunk_size(s.size());
+  std::int64_t across = 0, across_anew = 0;
+  for (const Contact& c : s.contacts) {
+    across += c.i / chunk != c.j / chunk;
+    across_anew += order.place[c.i] / chunk != order.place[c.j] / chunk;
+  }
+  if (!(static_cast<double>(across) > lost * static_cast<double>(across_anew))) return false;
+  take(order, s, also);
+  return true;
 }
 
 void sort_contacts(State& s) {

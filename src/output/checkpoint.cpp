@@ -18,7 +18,7 @@ inline constexpr bool hdf5::all_doubles<Row> = true;
 namespace {
 
 constexpr const char* kind = "checkpoint";
-constexpr std::int64_t format = 9;  // raise it with every change to a struct below
+constexpr std::int64_t format = 10;  // raise it with every change to a struct below
 
 // Every member of every stored struct, once, for writing and for reading. A new member is one more line; one
 // that is forgotten does not compile.
@@ -226,6 +226,7 @@ constexpr std::tuple members<Checkpoint>{
     Member{"stage", &Checkpoint::stage},
     Member{"start", &Checkpoint::start},
     Member{"height_0", &Checkpoint::height_0},
+    Member{"diameter", &Checkpoint::diameter},
     Member{"critical_step", &Checkpoint::critical_step},
     Member{"critical_at", &Checkpoint::critical_at},
     Member{"finished", &Checkpoint::finished},

@@ -139,6 +139,7 @@ struct Checkpoint {
   std::int64_t stage = 0;  // index
   StageStart start;        // of the stage
   double height_0 = 0;     // m, H_0: of the bed when the stage, or the shear that it carries on, began
+  double diameter = 0;     // m, mean of the grains, summed in memory order as it was when the stage began
   // With dt = "auto": the critical step of the contact network, s, and the step of the clock it was found at.
   double critical_step = 0;
   std::int64_t critical_at = 0;

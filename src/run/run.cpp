@@ -11,6 +11,7 @@
 
 #include "case/keys.hpp"
 #include "case/materials.hpp"
+#include "dem/memory_order.hpp"
 #include "error.hpp"
 #include "memory.hpp"
 #include "output/files.hpp"
@@ -213,6 +214,8 @@ class Runner {
       record(stage);
       snapshot(stage);
       if (presses(stage) && now_.state.step % steps_between_presses == 0) press(stage);
+      if (stage.goes_on && looks_at_order(stage, now_.state.step, options_.ordering.steps))
+        renew_order(stage);
       if (case_.automatic_dt && stage.goes_on) follow_bed(stage);  // as after any record
       if (index == 0) save();
     }
@@ -238,6 +241,7 @@ class Runner {
       if (case_.automatic_dt) until = std::min(until, estimate);
       const std::int64_t jump = (step / steps_between_presses + 1) * steps_between_presses;
       if (presses(stage)) until = std::min(until, jump);
+      until = std::min(until, next_look_at_order(step, options_.ordering.steps));
       until = at_exchange(stage, until);
       const auto began = Clock::now();
       const bool due = until == event.step;
@@ -253,6 +257,7 @@ class Runner {
       }
       if (Clock::now() >= next_list_) list_snapshots();
       if (presses(stage) && !ended && step == jump) press(stage);
+      if (!ended && looks_at_order(stage, step, options_.ordering.steps)) renew_order(stage);
       if (case_.automatic_dt && !ended && (due || step == estimate)) follow_bed(stage);
       const std::int64_t done = step - stage.first_step;
       if (options_.on_progress) options_.on_progress(index, done, std::max<std::int64_t>(done, steps));
@@ -332,6 +337,16 @@ class Runner {
     from.slip += s.ledger.slip - before.slip - slip;
     from.viscous += s.ledger.viscous - before.viscous;
     from.planes += s.ledger.planes - before.planes - work;
+  }
+
+  // Grains that have sheared past one another are sorted in memory anew. The water goes on as on a restart.
+  void renew_order(Stage& stage) {
+    take_state();
+    std::vector<dem::Vec3d>* const map = water_ ? &now_.water.x_map : nullptr;
+    if (!dem::renew_order(stage.scene, now_.state, options_.ordering.lost, map)) return;
+    auto water = fill(stage, now_.state, now_.water, /*under_way=*/true);
+    engine_->load(stage.scene, now_.state, water.get());
+    water_ = std::move(water);
   }
 
   // From one step to another.

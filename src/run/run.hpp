@@ -1,5 +1,6 @@
 // Runs a case: its stages one after the other, with output, checkpoints and restart.
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -11,6 +12,14 @@
 
 namespace moraine::run {
 
+// When grains are sorted in memory anew (dem/memory_order.hpp): at multiples of `steps` of the scene's clock,
+// or at the first exchange after, if contacts across chunks are more than `lost` times as many as they would
+// be then.
+struct Ordering {
+  std::int64_t steps = 16384;  // many, so that looking takes no time of theirs
+  double lost = 1.25;
+};
+
 struct Options {
   std::filesystem::path directory;
   std::vector<cases::Override> overrides;
@@ -18,6 +27,7 @@ struct Options {
   int threads = 0;         // of each rank; 0: all
   Ranks* ranks = nullptr;  // that share the bed; this is rank 0. null: there are no others
   bool resume = false, force = false, quiet = false;
+  Ordering ordering;  // another gives other bits: for tests
   // Told every now and then: so many steps of so many of that stage are done.
   std::function<void(std::size_t stage, std::int64_t step, std::int64_t steps)> on_progress;
 };

@@ -46,6 +46,14 @@ std::int64_t at_exchange(const Stage& stage, std::int64_t step) {
   return (step + m - 1) / m * m;
 }
 
+bool looks_at_order(const Stage& stage, std::int64_t step, std::int64_t between) {
+  return step == at_exchange(stage, step / between * between);
+}
+
+std::int64_t next_look_at_order(std::int64_t step, std::int64_t between) {
+  return (step / between + 1) * between;
+}
+
 double critical_step(const dem::Scene& scene, const dem::State& state) {
   return std::min(dem::critical_step(dem::spectrum(scene, state)), dem::one_contact_step(scene, state));
 }

@@ -24,6 +24,11 @@ std::int64_t last_step(const Stage& stage);  // of the stage, with the present d
 // The same or the first later step at which grains meet pore water: only there is the state whole.
 std::int64_t at_exchange(const Stage& stage, std::int64_t step);
 
+// Where it is decided whether grains are to be sorted in memory anew: at every multiple of `between`, or at
+// the first exchange after. The next one is that of a later step, before at_exchange.
+bool looks_at_order(const Stage& stage, std::int64_t step, std::int64_t between);
+std::int64_t next_look_at_order(std::int64_t step, std::int64_t between);
+
 double critical_step(const dem::Scene& scene, const dem::State& state);  // s
 
 // Sets the step from here on: the longest up to `longest` that meets the next event.

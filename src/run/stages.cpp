@@ -284,12 +284,11 @@ fluid::Side side_of(const cases::FluidSide& side) {
 }
 
 coupling::Water water_of(const cases::Case& c, const cases::Stage& stage, const dem::Scene& scene,
-                         double height, const dem::State& s) {
+                         double height, double diameter) {
   coupling::Water w;
   w.present = stage.fluid;
   if (!w.present) return w;
   const cases::Fluid& f = c.fluid;
-  const double diameter = mean_diameter(s);
   w.viscosity = f.viscosity, w.compressibility = f.compressibility;
   w.k_c = f.permeability_factor;
   w.porosity_range = {f.porosity_min, f.porosity_max};
@@ -345,7 +344,7 @@ bool goes_on(const cases::Case& c, const cases::Stage& stage, const Start& start
   scene.neighbour_margin = before.neighbour_margin;
   if (histories_of(stage) != now.histories) return false;
   set_pieces(scene, now.histories, now.state.step);
-  coupling::Water water = water_of(c, stage, scene, now.height_0, now.state);
+  coupling::Water water = water_of(c, stage, scene, now.height_0, now.diameter);
   water.solver = now.water_settings.solver, water.tolerance = now.water_settings.tolerance;
   if (scene != before || water != now.water_settings) return false;
   const double end = now.start.end + duration_of(stage, now);
@@ -430,7 +429,7 @@ Stage describe(const cases::Case& c, std::size_t index, const output::Checkpoint
   out.histories = now.histories;
   out.goes_on = true;
   out.first_step = now.start.step, out.first_time = now.start.clock, out.end = now.start.end;
-  out.diameter = mean_diameter(now.state);
+  out.diameter = now.diameter;
   out.strain_rate = nominal_rate(stage, now);
   out.duration = out.end - out.first_time;
   out.porosity = stage.porosity, out.pressure = stage.pressure;
@@ -465,11 +464,12 @@ Stage prepare(const cases::Case& c, std::size_t index, const Start& start, outpu
   s.water_force.clear(), s.water = {};
   dem::Scene scene = scene_of(c, stage, start, box, now.height_0);
   dem::sort_spatially(scene, s);
+  now.diameter = mean_diameter(s);
   scene.dt = c.automatic_dt ? c.safety * critical_step(scene, s) : step_of(c, stage, scene, s);
   now.histories = histories_of(stage);
   set_pieces(scene, now.histories, s.step);
   now.scene = scene;
-  now.water_settings = water_of(c, stage, scene, now.height_0, s);
+  now.water_settings = water_of(c, stage, scene, now.height_0, now.diameter);
   now.critical_step = 0, now.critical_at = 0;
   now.start = {};
   now.start.end = duration_of(stage, now);

@@ -65,6 +65,35 @@ TEST(Order, WrapsIntoTheBoxWithTheStartingPoint) {
   }
 }
 
+// Where chunks have spread through each other, and there alone; positions stay as they are.
+TEST(Order, RenewsWhatIsLost) {
+  Bed bed = sheared_bed();
+  bed.state = run(*make_engine(Backend::cpu, 1), bed.scene, bed.state, 300);
+  State good = bed.state;
+  sort_spatially(bed.scene, good);
+  State s = good;
+  EXPECT_FALSE(renew_order(bed.scene, s, 1.25));
+  expect_same_bits(s, good);
+
+  s = shuffled(good);
+  s.x[0] += Vec3d{bed.scene.box.x, 0, 0};  // one box further
+  s.water_force = s.torque;
+  std::vector<Vec3d> also = s.x;
+  EXPECT_TRUE(renew_order(bed.scene, s, 1.25, &also));
+  EXPECT_TRUE(also == s.x);
+  EXPECT_TRUE(s.water_force == s.torque);
+  const auto further = std::ranges::count_if(s.x, [&](const Vec3d& x) { return x.x >= bed.scene.box.x; });
+  EXPECT_EQ(further, 1);
+  s.water_force.clear();
+  sort_spatially(bed.scene, s);  // which wraps
+  for (Index i = 0; i < s.size(); ++i) EXPECT_LT(length(s.x[i] - good.x[i]), 1e-14);
+  s.x = good.x, s.x_start = good.x_start;
+  expect_same_bits(s, good);
+
+  s.x[3].y = std::nan("");
+  EXPECT_FALSE(renew_order(bed.scene, s, -1));
+}
+
 class OrderOnBackends : public OnEveryBackend {};
 
 // Forces follow the ids, springs turn round with their pairs: the same course in any order, to rounding.

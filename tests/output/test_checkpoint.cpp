@@ -21,7 +21,7 @@ Checkpoint sample(dem::Index grains) {
   c.version = "1.2.3";
   c.stage = 2;
   c.start.time = number(), c.start.step = 12;
-  c.height_0 = -0.0;
+  c.height_0 = -0.0, c.diameter = 1e-2 / 3;
   c.start.energy = std::numeric_limits<double>::denorm_min();
   c.finished = true;
   c.scene.box = number.vector();
@@ -57,7 +57,7 @@ class CheckpointFile : public testing::Test {
     return message([&] { read_checkpoint(path); });
   }
   // As if the file had been written with what now stands in it.
-  void reseal(std::int64_t format = 9) const {
+  void reseal(std::int64_t format = 10) const {
     std::string bytes = contents(path);
     seal(bytes, "checkpoint", format);
     directory.write("checkpoint.h5", bytes);
@@ -219,7 +219,7 @@ TEST_F(CheckpointFile, RefusesAnotherFormat) {
   reseal(1000);
   EXPECT_EQ(
       why_not(),
-      path.string() + ": written by a later version of moraine (checkpoint format 1000; this one reads 9)");
+      path.string() + ": written by a later version of moraine (checkpoint format 1000; this one reads 10)");
 
   directory.write("checkpoint.h5", hdf5);  // has lost its seal
   EXPECT_THROW(read_checkpoint(path), Damaged);
@@ -228,13 +228,13 @@ TEST_F(CheckpointFile, RefusesAnotherFormat) {
   EXPECT_TRUE(
       contains(why_not(), path.string() + ": written by an earlier version of moraine (checkpoint format 4"))
       << why_not();
-  EXPECT_TRUE(contains(why_not(), "this one reads 9")) << why_not();
+  EXPECT_TRUE(contains(why_not(), "this one reads 10")) << why_not();
 }
 
 // A checkpoint before it is no help where this version is the wrong one.
 TEST_F(CheckpointFile, CallsOnlyDamageDamage) {
   write_checkpoint(path, sample(2));
-  reseal(10);
+  reseal(11);
   try {
     read_checkpoint(path);
     FAIL();
