@@ -23,7 +23,6 @@ class PostOffice {
     const auto* first = static_cast<const std::byte*>(bytes);
     const std::lock_guard held(mutex_);
     boxes_[key].emplace_back(first, first + count);
-    ++messages_;
   }
   bool take(const Key& key, void* bytes, std::size_t most, std::size_t& count) {
     const std::lock_guard held(mutex_);
@@ -47,7 +46,6 @@ class PostOffice {
  private:
   std::mutex mutex_;
   std::map<Key, std::deque<std::vector<std::byte>>> boxes_;
-  std::int64_t messages_ = 0;
 };
 
 class ThreadRank final : public Ranks {
@@ -90,26 +88,35 @@ class ThreadRank final : public Ranks {
   std::uintptr_t last_ = 0;
 };
 
-// The first rank's engine, with threads that serve as the others.
-class EngineOnRanks {
+// So many ranks, of which all but the first serve.
+class ServingRanks {
  public:
-  EngineOnRanks(int ranks, int threads) {
+  explicit ServingRanks(int ranks) {
     for (int r = 0; r < ranks; ++r) ranks_.push_back(std::make_unique<ThreadRank>(office_, r, ranks));
     for (int r = 1; r < ranks; ++r) serving_.emplace_back([this, r] { dem::serve(*ranks_[r]); });
-    engine_ = dem::make_ranked_engine(*ranks_[0], threads);
   }
-  ~EngineOnRanks() {
+  ~ServingRanks() {
     dem::dismiss(*ranks_[0]);
     for (std::thread& t : serving_) t.join();
   }
-  dem::Engine& operator*() const { return *engine_; }
-  dem::Engine* operator->() const { return engine_.get(); }
+  Ranks& first() { return *ranks_[0]; }
   bool all_have_come() { return office_.empty(); }  // whether no message was sent for nothing
 
  private:
   PostOffice office_;
   std::vector<std::unique_ptr<ThreadRank>> ranks_;
   std::vector<std::thread> serving_;
+};
+
+// The first rank's engine.
+class EngineOnRanks : public ServingRanks {
+ public:
+  EngineOnRanks(int ranks, int threads)
+      : ServingRanks(ranks), engine_(dem::make_ranked_engine(first(), threads)) {}
+  dem::Engine& operator*() const { return *engine_; }
+  dem::Engine* operator->() const { return engine_.get(); }
+
+ private:
   std::unique_ptr<dem::Engine> engine_;
 };
 

@@ -1,6 +1,6 @@
 // Results have the very bits of the version that made the table, reference_bits.txt, on any number of
-// threads, with any neighbour list, on the GPU's loop and after a restart. To be renewed only with a change
-// of physics; then this writes it:
+// threads and ranks, with any neighbour list, on the GPU's loop and after a restart. To be renewed only with
+// a change of physics; then this writes it:
 //   MORAINE_WRITE_REFERENCE_BITS=tests/run/reference_bits.txt test_run --gtest_filter=*ReferenceBits*
 #include "reference_bits.hpp"
 
@@ -14,6 +14,7 @@
 #include "program.hpp"
 #include "reference_scenes.hpp"
 #include "run/run.hpp"
+#include "thread_ranks.hpp"
 
 namespace moraine {
 
@@ -195,6 +196,14 @@ TEST_P(ReferenceBits, AreTheSame) {
       const std::string how = std::to_string(n) + " threads";
       expect_again(how, computed(options(how, n)));
     }
+  for (const int n : {2, 3}) {
+    if (n > 2 && !on_threads) continue;
+    ServingRanks ranks(n);
+    run::Options with = options(std::to_string(n) + " ranks", n == 3 ? 2 : 1);
+    with.ranks = &ranks.first();
+    expect_again(with.directory.filename(), computed(with));
+    EXPECT_TRUE(ranks.all_have_come());
+  }
   if (scene.again & pieces) expect_again("interrupted", computed_in_pieces());
   if (scene.again & margins)
     for (const std::string margin : {"0.001", "0.004", "0.012"})
