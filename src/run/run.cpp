@@ -251,7 +251,7 @@ class Runner {
       step = until;
       ended = due && event.end;
       if (step == look && !due) take_state();
-      if (due || step == look) guard.check(now_.state);
+      if (due || step == look) guard.check(now_.state, due ? &loads_ : nullptr);
       if (due) {
         if (event.series) record(stage);
         if (event.snapshot) snapshot(stage);
