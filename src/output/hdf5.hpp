@@ -95,12 +95,13 @@ class Group {
   void write_rows(const std::string& name, std::size_t count, At&& at, const char* units = nullptr) const {
     const Handle dataset = create_dataset(name, element<T>(), count);
     std::vector<T> block(std::min(count, block_rows));
-    for (std::size_t first = 0; first == 0 || first < count; first += block.size()) {
+    std::size_t first = 0;
+    do {
       block.resize(std::min(count - first, block_rows));
       for (std::size_t k = 0; k < block.size(); ++k) block[k] = at(first + k);
       write_block(dataset, element<T>(), first, count, block.size(), block.data());
-      if (count == 0) break;
-    }
+      first += block.size();
+    } while (first < count);
     if (units) label(dataset, name, "units", units);
   }
   void write(const std::string& name, const std::vector<std::string>& rows) const;
