@@ -320,28 +320,42 @@ void for_each_member(F f) {
 }
 
 template <class T>
-void put_list(const hdf5::Group& group, const char* name, const std::vector<T>& list) {
+void put_list(const hdf5::Group& group, const char* name, const std::vector<T>& list);
+
+// A list whose k-th entry is at(k), as a column, or a group of them.
+template <class T, class At>
+void put_rows(const hdf5::Group& group, const char* name, std::size_t count, At&& at) {
   if constexpr (is_stored_struct<T>) {
     const hdf5::Group inner = group.create_group(name);
     for_each_member<T>([&](const char* member, auto pointer) {
-      std::vector<std::decay_t<decltype(list[0].*pointer)>> column;
-      for (const T& entry : list) column.push_back(entry.*pointer);
-      put_list(inner, member, column);
+      using M = std::decay_t<decltype(std::declval<T>().*pointer)>;
+      put_rows<M>(inner, member, count, [&](std::size_t k) -> const M& { return at(k).*pointer; });
     });
   } else if constexpr (is_list<T>) {  // one after the other, and how long each is
     const hdf5::Group inner = group.create_group(name);
     std::vector<std::int64_t> lengths;
     T all;
-    for (const T& one : list) {
+    for (std::size_t k = 0; k < count; ++k) {
+      const T& one = at(k);
       lengths.push_back(static_cast<std::int64_t>(one.size()));
       all.insert(all.end(), one.begin(), one.end());
     }
-    inner.write("lengths", lengths), put_list(inner, "all", all);
+    inner.write("lengths", lengths);
+    put_list(inner, "all", all);
   } else if constexpr (std::same_as<T, bool>) {
-    group.write(name, std::vector<std::uint8_t>(list.begin(), list.end()));
+    group.write_rows<std::uint8_t>(name, count, at);
+  } else if constexpr (std::same_as<T, std::string>) {
+    std::vector<std::string> texts;
+    for (std::size_t k = 0; k < count; ++k) texts.push_back(at(k));
+    group.write(name, texts);
   } else {
-    group.write(name, list);
+    group.write_rows<T>(name, count, at);
   }
+}
+
+template <class T>
+void put_list(const hdf5::Group& group, const char* name, const std::vector<T>& list) {
+  put_rows<T>(group, name, list.size(), [&](std::size_t k) -> decltype(auto) { return list[k]; });
 }
 
 template <class T>
@@ -372,41 +386,58 @@ void check_enumeration(const hdf5::Group& group, const char* name, const T& valu
 }
 
 template <class T>
-void get_list(const hdf5::Group& group, const char* name, std::vector<T>& list) {
+void get_list(const hdf5::Group& group, const char* name, std::vector<T>& list);
+
+// What put_rows wrote, to at(k); before that begin(group, name, count), of each column.
+template <class T, class Begin, class At>
+void get_rows(const hdf5::Group& group, const char* name, Begin&& begin, At&& at) {
+  const auto begin_here = [&](std::size_t count) { begin(group, name, count); };
   if constexpr (is_stored_struct<T>) {
     const hdf5::Group inner = group.open_group(name);
-    bool first = true;
     for_each_member<T>([&](const char* member, auto pointer) {
-      std::vector<std::decay_t<decltype(list[0].*pointer)>> column;
-      get_list(inner, member, column);
-      if (std::exchange(first, false)) list.resize(column.size());
-      if (column.size() != list.size()) {
-        throw error(inner.where(member), ": ", column.size(), " values, ", list.size(), " expected");
-      }
-      for (std::size_t k = 0; k < list.size(); ++k) list[k].*pointer = column[k];
+      using M = std::decay_t<decltype(std::declval<T>().*pointer)>;
+      get_rows<M>(inner, member, begin, [&](std::size_t k) -> M& { return at(k).*pointer; });
     });
   } else if constexpr (is_list<T>) {
     const hdf5::Group inner = group.open_group(name);
     std::vector<std::int64_t> lengths;
     T all;
     inner.read("lengths", lengths), get_list(inner, "all", all);
+    begin_here(lengths.size());
     std::size_t from = 0;
-    for (const std::int64_t length : lengths) {
+    for (std::size_t k = 0; k < lengths.size(); ++k) {
+      const std::int64_t length = lengths[k];
       if (length < 0 || static_cast<std::size_t>(length) > all.size() - from)
         throw error(inner.where("lengths"), ": ", length, " of ", all.size() - from,
                     " numbers that are left");
-      const auto begin = all.begin() + static_cast<std::ptrdiff_t>(from);
-      list.emplace_back(begin, begin + static_cast<std::ptrdiff_t>(length));
+      const auto first = all.begin() + static_cast<std::ptrdiff_t>(from);
+      at(k).assign(first, first + static_cast<std::ptrdiff_t>(length));
       from += static_cast<std::size_t>(length);
     }
+  } else if constexpr (std::same_as<T, std::string>) {
+    std::vector<std::string> texts;
+    group.read(name, texts);
+    begin_here(texts.size());
+    for (std::size_t k = 0; k < texts.size(); ++k) at(k) = std::move(texts[k]);
   } else if constexpr (std::same_as<T, bool>) {
-    std::vector<std::uint8_t> numbers;
-    group.read(name, numbers);
-    list.assign(numbers.begin(), numbers.end());
+    group.read_rows<std::uint8_t>(name, begin_here, [&](std::size_t k, std::uint8_t v) { at(k) = v != 0; });
   } else {
-    group.read(name, list);
-    for (const T& value : list) check_enumeration(group, name, value);
+    group.read_rows<T>(name, begin_here, [&](std::size_t k, const T& value) {
+      check_enumeration(group, name, value);
+      at(k) = value;
+    });
   }
+}
+
+template <class T>
+void get_list(const hdf5::Group& group, const char* name, std::vector<T>& list) {
+  bool first = true;
+  const auto begin = [&](const hdf5::Group& in, const char* column, std::size_t count) {
+    if (std::exchange(first, false)) list.resize(count);
+    if (count != list.size())
+      throw error(in.where(column), ": ", count, " values, ", list.size(), " expected");
+  };
+  get_rows<T>(group, name, begin, [&](std::size_t k) -> decltype(auto) { return list[k]; });
 }
 
 template <class T>
@@ -532,23 +563,25 @@ void validate(const std::string& file, const Checkpoint& c) {
 
 void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint,
                       const std::filesystem::path& before) {
-  const std::string bytes = [&] {
-    const hdf5::Lock lock;  // but not while the disk writes: other cases have rows to append
-    const auto file = hdf5::File::in_memory(path);
+  Aside place(path);
+  {
+    const hdf5::Lock lock;  // but not while the disk syncs: other cases have rows to append
+    auto file = hdf5::File::create(place);
     for_each_member<Checkpoint>(
         [&](const char* name, auto pointer) { put(file, name, checkpoint.*pointer); });
-    return file.sealed(kind, format);
-  }();
-  write_text(path, bytes, before);
+    file.close();
+  }
+  seal(place, kind, format);
+  place.put_in_place(before);
 }
 
 Checkpoint read_checkpoint(const std::filesystem::path& path) {
-  const Sealed found = read_sealed(path);
+  const Sealed found = check_seal(path);
   const auto fail = [&](const auto&... parts) { throw error(path.string(), ": ", parts...); };
   // Earlier files begin with HDF5 itself; what has lost its seal says, at byte 24, that one stood before it.
-  const bool without_seal = found.bytes.starts_with("\x89HDF") &&
-                            found.bytes.find("stage_start_time") != found.bytes.npos &&
-                            found.bytes.compare(24, 8, std::string(8, '\0')) == 0;
+  const bool without_seal = found.first.starts_with("\x89HDF") &&
+                            found.first.find("stage_start_time") != found.first.npos &&
+                            found.first.compare(24, 8, std::string(8, '\0')) == 0;
   if (without_seal)
     fail(
         "written by an earlier version of moraine (checkpoint format 4 or before, which has no checksum; "
@@ -560,7 +593,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& path) {
          " version of moraine (checkpoint format ", found.format, "; this one reads ", format, ")",
          found.format > format ? "" : "; run its case again");
   const hdf5::Lock lock;
-  const auto file = hdf5::File::from_memory(path, found.bytes);
+  const auto file = hdf5::File::open(path, H5F_ACC_RDONLY);
   Checkpoint checkpoint;
   for_each_member<Checkpoint>([&](const char* name, auto pointer) { get(file, name, checkpoint.*pointer); });
   validate(file.where(), checkpoint);

@@ -173,9 +173,8 @@ class DirectoryLock {
   int file_;
 };
 
-// Writes text (or any bytes) aside, waits until the disk has it, and renames it. Throws Error (path, cause:
-// disk full, permission), and then leaves what stood there before; that is renamed to BEFORE, where given.
-void write_text(const std::filesystem::path& path, std::string_view text,
-                const std::filesystem::path& before = {});
+// Writes text (or any bytes) aside, waits until the disk has it, and renames it (aside.hpp). Throws Error
+// (path, cause: disk full, permission), and then leaves what stood there before.
+void write_text(const std::filesystem::path& path, std::string_view text);
 
 }  // namespace moraine::output

@@ -72,6 +72,15 @@ Handle space(const std::vector<hsize_t>& extent, const std::vector<hsize_t>& mos
   return Handle(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), most.data()), H5Sclose);
 }
 
+// Of a dataset with so many rows some.
+Handle part(Element element, hsize_t first, hsize_t all, hsize_t count) {
+  Handle whole = space(extent(element, all), extent(element, all));
+  if (count == all) return whole;
+  const hsize_t from[2] = {first, 0}, size[2] = {count, element.columns};
+  H5Sselect_hyperslab(whole, H5S_SELECT_SET, from, nullptr, size, nullptr);
+  return whole;
+}
+
 Handle scalar() { return Handle(H5Screate(H5S_SCALAR), H5Sclose); }
 
 bool same_kind(hid_t type, hid_t expected) {
@@ -131,8 +140,24 @@ hsize_t Group::size(hid_t dataset, const std::string& name, Element expected) co
   return extent[0];
 }
 
-void Group::write_dataset(hid_t dataset, const std::string& name, Element element, const void* rows) const {
-  check(H5Dwrite(dataset, element.type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows), name, "write");
+void Group::expect_written(herr_t result) const {
+  if (result < 0) throw error(file_, ": cannot write: ", cause());
+}
+
+void Group::write_dataset(hid_t dataset, Element element, const void* rows) const {
+  expect_written(H5Dwrite(dataset, element.type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows));
+}
+
+void Group::write_block(hid_t dataset, Element element, hsize_t first, hsize_t all, hsize_t count,
+                        const void* rows) const {
+  const Handle there = part(element, first, all, count), here = part(element, 0, count, count);
+  expect_written(H5Dwrite(dataset, element.type, here, there, H5P_DEFAULT, rows));
+}
+
+void Group::read_block(hid_t dataset, const std::string& name, Element element, hsize_t first, hsize_t all,
+                       hsize_t count, void* rows) const {
+  const Handle there = part(element, first, all, count), here = part(element, 0, count, count);
+  check(H5Dread(dataset, element.type, here, there, H5P_DEFAULT, rows), name, "read");
 }
 
 void Group::read_dataset(hid_t dataset, const std::string& name, Element element, void* rows) const {
@@ -146,7 +171,7 @@ void Group::write(const std::string& name, const std::vector<std::string>& rows)
   for (const std::string& row : rows) table += row + std::string(longest - row.size(), '\0');
   const Handle type = string_type(longest);
   const Handle dataset = create_dataset(name, {type}, rows.size());
-  write_dataset(dataset, name, {type}, table.data());
+  write_dataset(dataset, {type}, table.data());
 }
 
 void Group::read(const std::string& name, std::vector<std::string>& rows) const {
@@ -206,27 +231,21 @@ File File::create(const std::filesystem::path& path) {
   return File(Handle(id, H5Fclose), path.string(), "");
 }
 
-File File::in_memory(const std::filesystem::path& path) {
+File File::create(const Aside& place) {
   start_library();
-  // The earliest format, which has no checksums: H5Fget_file_image of HDF5 1.10 leaves a wrong one in later
-  // formats.
+  // The earliest format: what reads one file that was ever written reads all of them.
   const Handle creation = without_times(H5P_FILE_CREATE), access = access_list(H5F_LIBVER_EARLIEST);
-  H5Pset_fapl_core(access, std::size_t{1} << 20, false);
   H5Pset_userblock(creation, seal_size);
-  const hid_t id = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation, access);
-  if (id < 0) throw error(path.string(), ": cannot make an HDF5 file in memory: ", cause());
-  return File(Handle(id, H5Fclose), path.string(), "");
+  H5Pset_sieve_buf_size(access, 0);  // lest a column wait in it until a handle closes, which reports nothing
+  const std::string path = place.path().string();
+  const hid_t id = H5Fcreate(place.file().c_str(), H5F_ACC_TRUNC, creation, access);
+  if (id < 0) throw error(path, ": cannot create the file: ", cause());
+  return File(Handle(id, H5Fclose), path, "");
 }
 
-File File::from_memory(const std::filesystem::path& path, const std::string& bytes) {
-  start_library();
-  const Handle access = access_list(H5F_LIBVER_EARLIEST);
-  H5Pset_fapl_core(access, std::size_t{1} << 20, false);
-  H5Pset_file_image(access, const_cast<char*>(bytes.data()), bytes.size());  // which it copies
-  // The name of an image must be one that no file can have.
-  const hid_t id = H5Fopen("/dev/null/image", H5F_ACC_RDONLY, access);
-  if (id < 0) throw error(path.string(), ": cannot open the file: ", cause());
-  return File(Handle(id, H5Fclose), path.string(), "");
+void File::close() {
+  flush();
+  check(H5Fclose(id_.release()), {}, "write");
 }
 
 File File::open(const std::filesystem::path& path, unsigned flags) {
@@ -242,14 +261,5 @@ File File::open(const std::filesystem::path& path, unsigned flags) {
 }
 
 void File::flush() const { check(H5Fflush(id_, H5F_SCOPE_LOCAL), {}, "write"); }
-
-std::string File::sealed(const std::string& kind, std::int64_t format) const {
-  flush();
-  const auto size = static_cast<std::size_t>(check(H5Fget_file_image(id_, nullptr, 0), {}, "take the image"));
-  std::string image(seal_size + size, '\0');  // HDF5 leaves the user block out
-  check(H5Fget_file_image(id_, image.data() + seal_size, size), {}, "take the image");
-  seal(image, kind, format);
-  return image;
-}
 
 }  // namespace moraine::output::hdf5

@@ -6,6 +6,7 @@
 #pragma once
 #include <hdf5.h>
 
+#include <algorithm>
 #include <concepts>
 #include <cstdint>
 #include <filesystem>
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "dem/vec3.hpp"
+#include "output/aside.hpp"
 
 namespace moraine::output::hdf5 {
 
@@ -41,6 +43,7 @@ class Handle {
     if (id_ >= 0) close_(id_);
   }
   operator hid_t() const { return id_; }
+  hid_t release() { return std::exchange(id_, H5I_INVALID_HID); }
 
  private:
   hid_t id_ = H5I_INVALID_HID;
@@ -84,7 +87,21 @@ class Group {
   template <class T>
   void write(const std::string& name, const std::vector<T>& rows, const char* units = nullptr) const {
     const Handle dataset = create_dataset(name, element<T>(), rows.size());
-    write_dataset(dataset, name, element<T>(), rows.data());
+    write_dataset(dataset, element<T>(), rows.data());
+    if (units) label(dataset, name, "units", units);
+  }
+  // The same of rows that are nowhere side by side: at(k) is the k-th. A block of them is gathered at a time.
+  template <class T, class At>
+  void write_rows(const std::string& name, std::size_t count, At&& at, const char* units = nullptr) const {
+    const Handle dataset = create_dataset(name, element<T>(), count);
+    std::vector<T> block(std::min(count, block_rows));
+    std::size_t first = 0;
+    do {
+      block.resize(std::min(count - first, block_rows));
+      for (std::size_t k = 0; k < block.size(); ++k) block[k] = at(first + k);
+      write_block(dataset, element<T>(), first, count, block.size(), block.data());
+      first += block.size();
+    } while (first < count);
     if (units) label(dataset, name, "units", units);
   }
   void write(const std::string& name, const std::vector<std::string>& rows) const;
@@ -94,6 +111,19 @@ class Group {
     const Handle dataset = open_dataset(name);
     rows.resize(size(dataset, name, element<T>()));
     read_dataset(dataset, name, element<T>(), rows.data());
+  }
+  // begin(count), then take(k, row) of one after the other.
+  template <class T, class Begin, class Take>
+  void read_rows(const std::string& name, Begin&& begin, Take&& take) const {
+    const Handle dataset = open_dataset(name);
+    const std::size_t count = size(dataset, name, element<T>());
+    begin(count);
+    std::vector<T> block(std::min(count, block_rows));
+    for (std::size_t first = 0; first < count; first += block.size()) {
+      block.resize(std::min(count - first, block_rows));
+      read_block(dataset, name, element<T>(), first, count, block.size(), block.data());
+      for (std::size_t k = 0; k < block.size(); ++k) take(first + k, block[k]);
+    }
   }
   void read(const std::string& name, std::vector<std::string>& rows) const;
   void read(const std::string& name, std::string& text) const;
@@ -114,14 +144,21 @@ class Group {
   Handle create_dataset(const std::string& name, Element element, hsize_t rows, hsize_t chunk = 0) const;
   Handle open_dataset(const std::string& name) const;
   hsize_t size(hid_t dataset, const std::string& name, Element expected) const;  // throws if of another kind
-  void write_dataset(hid_t dataset, const std::string& name, Element element, const void* rows) const;
+  void write_dataset(hid_t dataset, Element element, const void* rows) const;
   void read_dataset(hid_t dataset, const std::string& name, Element element, void* rows) const;
+  // Rows [first, first + count) of all there are.
+  void write_block(hid_t dataset, Element element, hsize_t first, hsize_t all, hsize_t count,
+                   const void* rows) const;
+  void read_block(hid_t dataset, const std::string& name, Element element, hsize_t first, hsize_t all,
+                  hsize_t count, void* rows) const;
   void label(hid_t object, const std::string& name, const std::string& attribute,
              const std::string& text) const;
 
   std::string where(const std::string& name = {}) const;  // "series.h5: /name", as errors put it
   // Passes the result of an HDF5 call on, or throws "FILE: /name: cannot ACTION: CAUSE".
   hid_t check(hid_t result, const std::string& name, const char* action) const;
+  // The same of rows, "FILE: cannot write: CAUSE": what the disk refuses has nothing to do with the object.
+  void expect_written(herr_t result) const;
 
  protected:
   Group(Handle id, std::string file, std::string prefix)
@@ -130,6 +167,7 @@ class Group {
   std::string file_, prefix_;
 
  private:
+  static constexpr std::size_t block_rows = 1 << 16;
   void set_attribute(const std::string& name, Element element, const void* value) const;
   void get_attribute(const std::string& name, Element element, void* value) const;
 };
@@ -140,12 +178,10 @@ class File : public Group {
   static File create(const std::filesystem::path& path);
   void flush() const;
 
-  // A file made in memory and then written whole, with a seal (sealed.hpp) in front: what the disk refuses
-  // cannot leave half a file.
-  static File in_memory(const std::filesystem::path& path);
-  std::string sealed(const std::string& kind, std::int64_t format) const;
-  // Of the bytes of such a file; the path serves messages.
-  static File from_memory(const std::filesystem::path& path, const std::string& bytes);
+  // A new file with room for a seal (sealed.hpp) in front; errors name the place that it is to have. What
+  // stands in it is on the disk once close() has returned.
+  static File create(const Aside& place);
+  void close();
 
  private:
   using Group::Group;

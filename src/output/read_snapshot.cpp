@@ -36,13 +36,13 @@ void validate(const hdf5::Group& grains, const hdf5::Group& contacts, const Snap
 bool is_snapshot(const std::filesystem::path& path) { return kind_of(path) == kind; }
 
 Snapshot read_snapshot(const std::filesystem::path& path) {
-  const Sealed found = read_sealed(path);
+  const Sealed found = check_seal(path);
   if (found.kind != kind) throw Damaged(path.string() + ": not a snapshot of moraine, or damaged");
   if (found.format != format)
     throw error(path.string(), ": written by ", found.format > format ? "a later" : "an earlier",
                 " version of moraine (snapshot format ", found.format, "; this one reads ", format, ")");
   const hdf5::Lock lock;
-  const auto file = hdf5::File::from_memory(path, found.bytes);
+  const auto file = hdf5::File::open(path, H5F_ACC_RDONLY);
   Snapshot s;
   file.get("box", s.box);
   file.get("top_wall", s.top_wall);

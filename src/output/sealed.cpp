@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <memory>
 #include <sstream>
 #include <string_view>
 
@@ -19,16 +20,32 @@ namespace {
 constexpr std::string_view mark = "moraine sha256 ";
 constexpr std::size_t first_line = mark.size() + 64 + 1;
 
-std::string digest_of(std::string_view bytes) {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest;
-  unsigned size = 0;
-  if (!EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr))
-    throw error("libcrypto has no SHA-256");
-  std::string text;
-  for (unsigned k = 0; k < size; ++k)
-    for (const int digit : {digest[k] >> 4, digest[k] & 15}) text += "0123456789abcdef"[digit];
-  return text;
-}
+constexpr std::size_t block = 1 << 20;
+
+// SHA-256 of bytes that come one after the other.
+class Digest {
+ public:
+  Digest() : context_(EVP_MD_CTX_new()) { expect(EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr)); }
+  void add(std::string_view bytes) { expect(EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size())); }
+  std::string text() {
+    std::array<unsigned char, EVP_MAX_MD_SIZE> digest;
+    unsigned size = 0;
+    expect(EVP_DigestFinal_ex(context_.get(), digest.data(), &size));
+    std::string text;
+    for (unsigned k = 0; k < size; ++k)
+      for (const int digit : {digest[k] >> 4, digest[k] & 15}) text += "0123456789abcdef"[digit];
+    return text;
+  }
+
+ private:
+  static void expect(int done) {
+    if (done != 1) throw error("libcrypto has no SHA-256");
+  }
+  struct Free {
+    void operator()(EVP_MD_CTX* context) const { EVP_MD_CTX_free(context); }
+  };
+  std::unique_ptr<EVP_MD_CTX, Free> context_;
+};
 
 class Reader {
  public:
@@ -48,40 +65,52 @@ class Reader {
   Reader& operator=(const Reader&) = delete;
 
   std::uint64_t size() const { return static_cast<std::uint64_t>(about_.st_size); }
-  // So many bytes more, or all there are.
-  void append_to(std::string& bytes, std::uint64_t count) const {
-    const std::size_t before = bytes.size();
-    bytes.resize(before + std::min<std::uint64_t>(count, size() - before));
-    for (std::size_t at = before; at < bytes.size();) {
+  // So many bytes more, or all that are left.
+  std::string next(std::uint64_t count) {
+    std::string bytes(std::min(count, size() - read_), '\0');
+    for (std::size_t at = 0; at < bytes.size();) {
       const ssize_t got = ::read(file_, bytes.data() + at, bytes.size() - at);
       if (got < 0 && errno == EINTR) continue;
       if (got < 0) throw Damaged(path_ + ": cannot read: " + std::strerror(errno));
       if (got == 0) throw Damaged(path_ + ": damaged: was cut short while it was read");
       at += static_cast<std::size_t>(got);
     }
+    read_ += bytes.size();
+    return bytes;
+  }
+  void add_rest_to(Digest& digest) {
+    while (read_ < size()) digest.add(next(block));
   }
 
  private:
   std::string path_;
   int file_;
   struct stat about_ {};
+  std::uint64_t read_ = 0;
 };
 
 }  // namespace
 
 std::string digest_of_file(const std::filesystem::path& path) {
-  const Reader file(path);
-  std::string bytes;
-  file.append_to(bytes, file.size());
-  return digest_of(bytes);
+  Reader file(path);
+  Digest digest;
+  file.add_rest_to(digest);
+  return digest.text();
 }
 
-void seal(std::string& bytes, const std::string& kind, std::int64_t format) {
-  std::string rest = kind + " " + std::to_string(format) + "\nbytes " + std::to_string(bytes.size()) + "\n";
+void seal(Aside& file, const std::string& kind, std::int64_t format) {
+  const std::uint64_t size = file.size();
+  std::string rest = kind + " " + std::to_string(format) + "\nbytes " + std::to_string(size) + "\n";
   rest.resize(seal_size - first_line, '\n');
-  bytes.replace(first_line, rest.size(), rest);
-  const std::string digest = digest_of(std::string_view(bytes).substr(first_line));
-  bytes.replace(0, first_line, std::string(mark) + digest + "\n");
+  Digest digest;
+  digest.add(rest);
+  std::string bytes;
+  for (std::uint64_t at = seal_size; at < size; at += bytes.size()) {
+    bytes.resize(std::min<std::uint64_t>(block, size - at));
+    file.read(at, bytes.data(), bytes.size());
+    digest.add(bytes);
+  }
+  file.overwrite(0, std::string(mark) + digest.text() + "\n" + rest);
 }
 
 std::string kind_of(const std::filesystem::path& path) {
@@ -95,15 +124,16 @@ std::string kind_of(const std::filesystem::path& path) {
   return kind;
 }
 
-Sealed read_sealed(const std::filesystem::path& path) {
-  const Reader file(path);
+Sealed check_seal(const std::filesystem::path& path) {
+  Reader file(path);
   Sealed out;
-  file.append_to(out.bytes, seal_size);
-  if (!out.bytes.starts_with(mark)) {
-    file.append_to(out.bytes, 1 << 20);
+  const std::string head = file.next(seal_size);
+  if (!head.starts_with(mark)) {
+    out.first = head + file.next(block);
     return out;
   }
-  std::istringstream words(out.bytes.substr(std::min(first_line, out.bytes.size())));
+  const std::string_view rest = std::string_view(head).substr(std::min(first_line, head.size()));
+  std::istringstream words{std::string(rest)};
   std::string kind, size_name;
   std::uint64_t size = 0;
   const bool readable = words >> kind >> out.format >> size_name >> size && size_name == "bytes";
@@ -111,10 +141,10 @@ Sealed read_sealed(const std::filesystem::path& path) {
   if (readable && file.size() != size)
     throw Damaged(path.string() + ": damaged: " + (file.size() < size ? "truncated, " : "") +
                   std::to_string(file.size()) + " bytes where it had " + std::to_string(size));
-  if (readable) file.append_to(out.bytes, size);
-  const std::string_view all = out.bytes;
-  if (!readable || all.substr(mark.size(), 64) != digest_of(all.substr(first_line)) ||
-      all[first_line - 1] != '\n')
+  Digest digest;
+  digest.add(rest);
+  if (readable) file.add_rest_to(digest);
+  if (!readable || head.substr(mark.size(), 64) != digest.text() || head[first_line - 1] != '\n')
     throw Damaged(path.string() + ": damaged: its SHA-256 is not the one that it was written with");
   out.kind = kind;
   return out;

@@ -26,7 +26,7 @@ void create(const std::filesystem::path& path, const std::vector<Row>& rows,
     std::transform(rows.begin(), rows.end(), numbers.begin(),
                    [c](const Row& row) { return std::bit_cast<Numbers>(row)[c]; });
     const auto dataset = file.create_dataset(name, hdf5::element<double>(), rows.size(), chunk);
-    file.write_dataset(dataset, name, hdf5::element<double>(), numbers.data());
+    file.write_dataset(dataset, hdf5::element<double>(), numbers.data());
     file.label(dataset, name, "units", units);
     file.label(dataset, name, "meaning", meaning);
   }

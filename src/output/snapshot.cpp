@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <numeric>
 #include <sstream>
@@ -9,6 +8,7 @@
 #include "error.hpp"
 #include "output/files.hpp"
 #include "output/hdf5.hpp"
+#include "output/sealed.hpp"
 
 namespace moraine::output {
 namespace {
@@ -28,69 +28,83 @@ Vec3d wrap(const dem::Scene& scene, Vec3d x) {
   return x;
 }
 
-// A list in the order of `rows`, each passed through `f`.
-template <class T, class F = std::identity>
-auto arrange(const std::vector<T>& list, const std::vector<std::size_t>& rows, F f = {}) {
-  std::vector<std::decay_t<std::invoke_result_t<F, const T&>>> arranged;
-  arranged.reserve(rows.size());
-  for (const std::size_t row : rows) arranged.push_back(std::invoke(f, list[row]));
-  return arranged;
-}
-
-template <class Less>
-std::vector<std::size_t> sorted_rows(std::size_t count, Less less) {
-  std::vector<std::size_t> rows(count);
-  std::iota(rows.begin(), rows.end(), 0);
-  std::sort(rows.begin(), rows.end(), less);
-  return rows;
+template <class T>
+void write_column(const hdf5::Group& group, const char* name, const std::vector<std::size_t>& rows,
+                  const std::vector<T>& list, const char* units) {
+  group.write_rows<T>(
+      name, rows.size(), [&](std::size_t k) { return list[rows[k]]; }, units);
 }
 
 void write_grains(const hdf5::Group& grains, const dem::Scene& scene, const dem::State& state,
                   const dem::Loads& loads) {
-  const auto rows = sorted_rows(state.id.size(), [&](auto a, auto b) { return state.id[a] < state.id[b]; });
-  std::vector<Vec3d> displacement = state.x;
-  for (std::size_t k = 0; k < displacement.size(); ++k) displacement[k] -= state.x_start[k];
+  std::vector<std::size_t> rows(state.id.size());
+  std::iota(rows.begin(), rows.end(), 0);
+  std::sort(rows.begin(), rows.end(), [&](auto a, auto b) { return state.id[a] < state.id[b]; });
+  const auto write = [&](const char* name, const auto& list, const char* units) {
+    write_column(grains, name, rows, list, units);
+  };
+  const auto write_each = [&](const char* name, auto&& of, const char* units) {
+    grains.write_rows<Vec3d>(
+        name, rows.size(), [&](std::size_t k) { return of(rows[k]); }, units);
+  };
 
-  grains.write("id", arrange(state.id, rows), "1");
-  grains.write("role", arrange(state.part_of, rows), "1");
-  if (!state.material.empty()) grains.write("material", arrange(state.material, rows), "1");
-  grains.write("radius", arrange(state.r, rows), "m");
-  grains.write("position", arrange(state.x, rows, [&](const Vec3d& x) { return wrap(scene, x); }), "m");
-  grains.write("displacement", arrange(displacement, rows), "m");
-  grains.write("velocity", arrange(dem::velocity(scene, state), rows), "m/s");
-  grains.write("spin", arrange(state.omega, rows), "rad/s");
-  grains.write("rotation", arrange(state.rotation, rows), "rad");
-  grains.write("force", arrange(loads.force, rows), "N");  // by contacts; without gravity
-  if (!state.water_force.empty()) grains.write("water_force", arrange(state.water_force, rows), "N");
-  grains.write("pressure", arrange(dem::grain_pressure(state, loads), rows), "Pa");
+  write("id", state.id, "1");
+  write("role", state.part_of, "1");
+  if (!state.material.empty()) write("material", state.material, "1");
+  write("radius", state.r, "m");
+  write_each(
+      "position", [&](std::size_t i) { return wrap(scene, state.x[i]); }, "m");
+  write_each(
+      "displacement", [&](std::size_t i) { return state.x[i] - state.x_start[i]; }, "m");
+  write("velocity", dem::velocity(scene, state), "m/s");
+  write("spin", state.omega, "rad/s");
+  write("rotation", state.rotation, "rad");
+  write("force", loads.force, "N");  // by contacts; without gravity
+  if (!state.water_force.empty()) write("water_force", state.water_force, "N");
+  write("pressure", dem::grain_pressure(state, loads), "Pa");
 }
 
 // Grains by their ids, i < j, sorted: the file does not depend on the memory order. Forces are on i.
 std::int64_t write_contacts(const hdf5::Group& group, const dem::Scene& scene, const dem::State& state,
-                            std::vector<dem::ContactForce> contacts) {
-  using dem::ContactForce;
-  for (ContactForce& c : contacts) {
-    c.i = state.id[static_cast<std::size_t>(c.i)];
-    c.j = state.id[static_cast<std::size_t>(c.j)];
-    if (c.i < c.j) continue;
-    std::swap(c.i, c.j);
-    c.f_n = -c.f_n;
-    c.f_t = -c.f_t;
+                            const std::vector<dem::ContactForce>& contacts) {
+  struct Entry {
+    Index i, j;          // ids
+    std::size_t turned;  // 2 * its number, and 1 more where that of j comes first there
+  };
+  std::vector<Entry> rows;
+  rows.reserve(contacts.size());
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const Index i = state.id[static_cast<std::size_t>(contacts[k].i)],
+                j = state.id[static_cast<std::size_t>(contacts[k].j)];
+    rows.push_back({std::min(i, j), std::max(i, j), 2 * k + (i < j ? 0 : 1)});
   }
-  const auto rows = sorted_rows(contacts.size(), [&](auto a, auto b) {
-    return std::pair(contacts[a].i, contacts[a].j) < std::pair(contacts[b].i, contacts[b].j);
-  });
-  std::vector<Index> number(contacts.size());
-  std::iota(number.begin(), number.end(), 0);
+  std::sort(rows.begin(), rows.end(),
+            [](const Entry& a, const Entry& b) { return std::pair(a.i, a.j) < std::pair(b.i, b.j); });
+  const auto contact = [&](std::size_t k) -> const dem::ContactForce& {
+    return contacts[rows[k].turned / 2];
+  };
+  const auto on_i = [&](std::size_t k, const Vec3d& f) { return rows[k].turned % 2 ? -f : f; };
+  const auto write = [&]<class T>(const char* name, T, auto&& of, const char* units) {
+    group.write_rows<T>(name, rows.size(), of, units);
+  };
+  const Vec3d vector{};
 
-  group.write("id", number, "1");
-  group.write("i", arrange(contacts, rows, &ContactForce::i), "1");
-  group.write("j", arrange(contacts, rows, &ContactForce::j), "1");
-  group.write("point", arrange(contacts, rows, [&](const auto& c) { return wrap(scene, c.point); }), "m");
-  group.write("force_normal", arrange(contacts, rows, &ContactForce::f_n), "N");
-  group.write("force_tangential", arrange(contacts, rows, &ContactForce::f_t), "N");
-  group.write("force", arrange(contacts, rows, [](const auto& c) { return c.f_n + c.f_t; }), "N");
-  group.write("overlap", arrange(contacts, rows, &ContactForce::overlap), "m");
+  write(
+      "id", Index{}, [](std::size_t k) { return static_cast<Index>(k); }, "1");
+  write(
+      "i", Index{}, [&](std::size_t k) { return rows[k].i; }, "1");
+  write(
+      "j", Index{}, [&](std::size_t k) { return rows[k].j; }, "1");
+  write(
+      "point", vector, [&](std::size_t k) { return wrap(scene, contact(k).point); }, "m");
+  write(
+      "force_normal", vector, [&](std::size_t k) { return on_i(k, contact(k).f_n); }, "N");
+  write(
+      "force_tangential", vector, [&](std::size_t k) { return on_i(k, contact(k).f_t); }, "N");
+  write(
+      "force", vector, [&](std::size_t k) { return on_i(k, contact(k).f_n) + on_i(k, contact(k).f_t); }, "N");
+  write(
+      "overlap", double{}, [&](std::size_t k) { return contact(k).overlap; }, "m");
   return static_cast<std::int64_t>(contacts.size());
 }
 
@@ -251,21 +265,27 @@ SnapshotInfo write_snapshot(const std::filesystem::path& directory, const std::s
                             const dem::Scene& scene, const dem::State& staggered,
                             const std::optional<coupling::WaterFields>& water, const dem::Loads* mean,
                             const StageStart& start) {
-  const hdf5::Lock lock;
   SnapshotInfo info{name + ".h5", time, staggered.size(), 0};
-  const auto file = hdf5::File::in_memory(directory / info.file);
-  file.set("program", std::string("moraine"));
-  file.set("name", name);
-  file.set("time", time);
-  file.set("step", staggered.step - start.step);
-  file.set("stage_time", scene.time(staggered.step) - start.clock);
-  file.set("box", scene.box);
-  file.set("top_wall", staggered.wall_z());
-  const dem::Loads loads = mean ? *mean : dem::loads_of(scene, staggered);
-  write_grains(file.create_group("grains"), scene, staggered, loads);
-  info.contacts = write_contacts(file.create_group("contacts"), scene, staggered, loads.contacts);
-  if (water) write_water(file.create_group("water"), *water, info);
-  write_text(directory / info.file, file.sealed("snapshot", 1));
+  Aside place(directory / info.file);
+  {
+    const hdf5::Lock lock;
+    auto file = hdf5::File::create(place);
+    file.set("program", std::string("moraine"));
+    file.set("name", name);
+    file.set("time", time);
+    file.set("step", staggered.step - start.step);
+    file.set("stage_time", scene.time(staggered.step) - start.clock);
+    file.set("box", scene.box);
+    file.set("top_wall", staggered.wall_z());
+    const dem::Loads of_step = mean ? dem::Loads{} : dem::loads_of(scene, staggered);
+    const dem::Loads& loads = mean ? *mean : of_step;
+    write_grains(file.create_group("grains"), scene, staggered, loads);
+    info.contacts = write_contacts(file.create_group("contacts"), scene, staggered, loads.contacts);
+    if (water) write_water(file.create_group("water"), *water, info);
+    file.close();
+  }
+  seal(place, "snapshot", 1);
+  place.put_in_place();
   return info;
 }
 

@@ -103,7 +103,7 @@ Guard::Guard(const cases::Guards& limits, const Stage& stage, const std::vector<
   for (auto r = own; r != rows.end(); ++r) most_put_in_ = std::max(most_put_in_, energy_put_in({first_, *r}));
 }
 
-void Guard::check(const dem::State& s) {
+void Guard::check(const dem::State& s, const dem::Loads* loads) {
   check_numbers(stage_, s);
   if (const Overlap o = deepest_overlap(stage_.scene, s); o.fraction > limits_.max_overlap)
     throw error(
@@ -118,7 +118,7 @@ void Guard::check(const dem::State& s) {
               "Hertz's law), or the "
               "step is too long (try a smaller "
               "model.f)");
-  check_energy(s);
+  loads ? check_energy(s, *loads) : check_energy(s, dem::loads_of(stage_.scene, s));
 }
 
 bool Guard::finds_healthy(const dem::State& s) const {
@@ -130,9 +130,8 @@ bool Guard::finds_healthy(const dem::State& s) const {
   return true;
 }
 
-void Guard::check_energy(const dem::State& s) {
-  const output::Row now =
-      row_of(static_cast<std::size_t>(first_.stage), stage_, s, dem::loads_of(stage_.scene, s), start_);
+void Guard::check_energy(const dem::State& s, const dem::Loads& loads) {
+  const output::Row now = row_of(static_cast<std::size_t>(first_.stage), stage_, s, loads, start_);
   most_put_in_ = std::max(most_put_in_, energy_put_in({first_, now}));
   // Rounding of the potential energy may exceed what a bed at rest has stored.
   const double had = stored_at_least(first_) + most_put_in_ + 1e-10 * std::abs(first_.potential);

@@ -26,12 +26,13 @@ class Guard {
         const output::StageStart& start);
 
   std::int64_t every() const { return limits_.interval; }  // steps
-  void check(const dem::State& state);                     // throws Error
+  // Throws Error. loads: those of the state where they are at hand; null: they are found for it.
+  void check(const dem::State& state, const dem::Loads* loads = nullptr);
   // At times of the clock, where a check must not decide how a run ends but a checkpoint should be good.
   bool finds_healthy(const dem::State& state) const;
 
  private:
-  void check_energy(const dem::State& state);
+  void check_energy(const dem::State& state, const dem::Loads& loads);
 
   cases::Guards limits_;
   const Stage& stage_;               // whose step may change meanwhile

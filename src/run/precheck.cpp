@@ -305,6 +305,7 @@ std::vector<std::string> precheck(const cases::Case& c, const Start& start, dem:
                               "box.y, fluid.height)"));
     if (k > 0) continue;
     engine.load(stage.scene, s, water.get());
+    now.state = {};  // gone before the engine's comes
     check_overlaps(c, stage.scene, engine.state(), warnings);
   }
   return warnings;

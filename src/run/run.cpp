@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <iostream>
 #include <set>
+#include <utility>
 
 #include "case/keys.hpp"
 #include "case/materials.hpp"
@@ -79,6 +80,8 @@ class Runner {
     start_ = start_of(case_);  // with the engine, before anything of an earlier run is touched
     engine_ = dem::make_engine(options_.backend, options_.threads, options_.ranks);
     warnings_ = precheck(case_, start_, *engine_);
+    describes_ = engine_->describe();                                // with the threads that such a bed has
+    engine_ = dem::make_engine(options_.backend, options_.threads);  // lets go of the bed that was checked
     make_directories(files_.output);
     const output::DirectoryLock lock(files_.output);
     const bool resuming = settle_old_output();
@@ -138,6 +141,7 @@ class Runner {
   }
 
   void accept(const fs::path& checkpoint) {
+    start_.before = {};  // the grains are those of the checkpoint
     now_ = output::read_checkpoint(checkpoint);
     const std::string refused = changed_physics(now_.case_text, case_);
     if (!refused.empty())
@@ -169,17 +173,17 @@ class Runner {
   }
 
   void run_stages(bool resuming) {
-    if (!resuming) now_ = start_.before;
+    if (!resuming) now_ = std::exchange(start_.before, {});
     now_.case_text = case_.resolved, now_.inputs = start_.inputs;
     now_.materials = cases::join(cases::material_names(case_), ", ");
     if (resuming) remove_later_snapshots(), all_listed_ = false;  // lists lag behind the snapshots
     now_.version = MORAINE_VERSION;
-    const std::string header = "# moraine " MORAINE_VERSION ", " + engine_->describe() + ", seed " +
-                               std::to_string(case_.grains.seed) + "\n";
+    const std::string header =
+        "# moraine " MORAINE_VERSION ", " + describes_ + ", seed " + std::to_string(case_.grains.seed) + "\n";
     output::write_text(files_.resolved(), header + case_.resolved);
     progress_->say((resuming ? "resumed: " : "") +
                    (case_.title.empty() ? case_.directory.string() : case_.title) + ": " +
-                   std::to_string(start_.before.state.size()) + " grains, " + engine_->describe());
+                   std::to_string(now_.state.size()) + " grains, " + describes_);
     if (!resuming && !start_.note.empty()) progress_->say(start_.note);
     for (const std::string& c : changes_) progress_->say("changed: " + c);
     for (const std::string& w : warnings_) progress_->say("warning: " + w);
@@ -209,10 +213,11 @@ class Runner {
         now_.critical_at = -steps_between_estimates;
         follow_bed(stage);
       }
-      begin(stage);
       loads_ = dem::loads_of(stage.scene, now_.state);
+      begin(stage);
       record(stage);
       snapshot(stage);
+      loads_ = {};
       if (presses(stage) && now_.state.step % steps_between_presses == 0) press(stage);
       if (stage.goes_on && looks_at_order(stage, now_.state.step, options_.ordering.steps))
         renew_order(stage);
@@ -250,10 +255,11 @@ class Runner {
       step = until;
       ended = due && event.end;
       if (step == look && !due) take_state();
-      if (due || step == look) guard.check(now_.state);
+      if (due || step == look) guard.check(now_.state, due ? &loads_ : nullptr);
       if (due) {
         if (event.series) record(stage);
         if (event.snapshot) snapshot(stage);
+        loads_ = {};
       }
       if (Clock::now() >= next_list_) list_snapshots();
       if (presses(stage) && !ended && step == jump) press(stage);
@@ -297,7 +303,7 @@ class Runner {
   void begin(const Stage& stage) {
     output::StageStart& start = now_.start;
     start.time = now_.rows.empty() ? 0 : now_.rows.back().time;
-    start.energy = dem::observe(stage.scene, now_.state).energy.total();
+    start.energy = dem::observe(stage.scene, now_.state, loads_).energy.total();
     start.ledger = now_.state.ledger;
     start.drained_top = now_.water.drained_top, start.drained_bottom = now_.water.drained_bottom;
     start.water_dissipated = now_.water.dissipated;
@@ -410,6 +416,7 @@ class Runner {
   }
 
   void take_state() {
+    now_.state = {};  // gone before the next one comes
     now_.state = engine_->state();
     now_.water = water_ ? water_->state() : coupling::WaterState{};
   }
@@ -429,6 +436,7 @@ class Runner {
   std::unique_ptr<dem::Engine> engine_;
   std::unique_ptr<Progress> progress_;
   std::vector<std::string> warnings_, changes_;
+  std::string describes_;     // the engine
   std::string damage_;        // of the checkpoint that was to be resumed from
   std::string said_outside_;  // in this stage
   std::unique_ptr<output::Series> series_;

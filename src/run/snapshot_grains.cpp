@@ -33,6 +33,7 @@ OwnGrains read_snapshot_grains(const cases::Case& c) {
   box.box = {own.box_x, own.box_y, own.box_z};
   box.periodic_x = c.periodic_x, box.periodic_y = c.periodic_y, box.periodic_z = c.periodic_z;
   const dem::Sides sides = dem::Sides::of(box);
+  s.contacts.reserve(snapshot.i.size());
   for (std::size_t k = 0; k < snapshot.i.size(); ++k) {
     dem::Contact contact{snapshot.i[k], snapshot.j[k], {}};
     const double r_i = s.r[contact.i], r_j = s.r[contact.j];

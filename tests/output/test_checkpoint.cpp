@@ -58,9 +58,10 @@ class CheckpointFile : public testing::Test {
   }
   // As if the file had been written with what now stands in it.
   void reseal(std::int64_t format = 10) const {
-    std::string bytes = contents(path);
-    seal(bytes, "checkpoint", format);
-    directory.write("checkpoint.h5", bytes);
+    Aside file(path);
+    file.write(contents(path));
+    seal(file, "checkpoint", format);
+    file.put_in_place();
   }
   // Overwrites a number of the file, wherever it stands in the groups.
   template <class T>

@@ -91,6 +91,37 @@ TEST(FailingDisk, FileTooLarge) {
   EXPECT_GE(read_series(directory.path() / "series.h5").size(), rows);
 }
 
+// Wherever in a file that HDF5 makes the disk is full: among rows, names, or the seal.
+TEST(FailingDisk, TooLargeAtAnyPlace) {
+  const TemporaryDirectory directory;
+  RandomNumbers number;
+  Checkpoint small, large;
+  small.state = random_state(number, 1);
+  large.state = random_state(number, 100);
+  const auto path = directory.path() / "checkpoint.h5", other = directory.path() / "other.h5";
+  write_checkpoint(path, small);
+  write_checkpoint(other, large);
+  const std::string before = contents(path);
+  const auto size = std::filesystem::file_size(other);
+  rlimit unlimited{};
+  getrlimit(RLIMIT_FSIZE, &unlimited);
+  const auto handler = ::signal(SIGXFSZ, SIG_IGN);
+  for (std::uintmax_t most = 0; most < size; most += size / 40) {
+    const rlimit limit{most, unlimited.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    const std::string why = message([&] { write_checkpoint(path, large); });
+    setrlimit(RLIMIT_FSIZE, &unlimited);
+    EXPECT_TRUE(why.starts_with(path.string() + ": ") && contains(why, "cannot ") &&
+                contains(why, ": File too large"))
+        << most << " of " << size << " bytes: " << why;
+    EXPECT_EQ(contents(path), before);
+    EXPECT_EQ(files_in(directory.path()), 2u);
+  }
+  ::signal(SIGXFSZ, handler);
+  write_checkpoint(path, large);
+  EXPECT_EQ(contents(path), contents(other));
+}
+
 TEST(FailingDisk, Full) {
   const TemporaryDirectory directory;
   const auto disk = directory.path() / "disk";

@@ -212,11 +212,11 @@ TEST_F(Snapshot, AreListedOnceForEachTime) {
 TEST_F(Snapshot, CarriesItsDigest) {
   const Bed bed;
   const auto file = path(write_snapshot(directory.path(), "a", 0, bed.scene, bed.state));
-  EXPECT_EQ(read_sealed(file).kind, "snapshot");
+  EXPECT_EQ(check_seal(file).kind, "snapshot");
   std::string bytes = contents(file);
   bytes[bytes.size() / 2] ^= 1;
   directory.write("a.h5", bytes);
-  EXPECT_THROW(read_sealed(file), Damaged);
+  EXPECT_THROW(check_seal(file), Damaged);
 }
 
 // Also with a step, or all steps, without contacts.
