@@ -73,6 +73,17 @@ void remember_velocities(const Scene& scene, State& s) {
   });
 }
 
+void reserve(State& s, Index grains, std::int64_t with_water_force) {
+  const auto n = static_cast<std::size_t>(grains);
+  s.r.reserve(n), s.part_of.reserve(n);
+  for (auto* list : {&s.x, &s.v, &s.omega, &s.rotation, &s.force, &s.torque}) list->reserve(n);
+  s.water_force.reserve(static_cast<std::size_t>(with_water_force));
+}
+
+bool touch(const Sides& sides, const GrainRow& a, const GrainRow& b) {
+  return between_grains(nearest_image(sides, a.x - b.x), a.r + b.r, a.r - b.r).delta_n < 0;
+}
+
 void append_grain(State& s, const GrainRow& g, const LoadRow& load, BodyId part_of) {
   s.r.push_back(g.r);
   s.x.push_back(g.x);
@@ -94,7 +105,7 @@ Spring<double> remembered(const Scene& scene, const ContactParameters& p, Spring
 
 void append_contact(State& s, const Scene& scene, const ContactParameters& p, const Sides& sides,
                     const GrainRow& a, const GrainRow& b, Index i, Index j, const Spring<double>& spring) {
-  if (!(between_grains(nearest_image(sides, a.x - b.x), a.r + b.r, a.r - b.r).delta_n < 0)) return;
+  if (!touch(sides, a, b)) return;
   s.contacts.push_back({i, j, remembered(scene, p, spring)});
 }
 

@@ -30,6 +30,9 @@ void remember_velocities(const Scene& scene, State& s);
 // spring, without damping no velocity, ...
 Spring<double> remembered(const Scene& scene, const ContactParameters& p, Spring<double> spring);
 
+// Room for so many, so that lists do not grow by copies of themselves.
+void reserve(State& s, Index grains, std::int64_t with_water_force);
+bool touch(const Sides& sides, const GrainRow& a, const GrainRow& b);
 void append_grain(State& s, const GrainRow& grain, const LoadRow& load, BodyId part_of);
 // Only if they touch; p: of their materials. The state has the materials of its grains.
 void append_contact(State& s, const Scene& scene, const ContactParameters& p, const Sides& sides,

@@ -134,6 +134,16 @@ State PairEngine::state() const {
     bodies.ledger.add(pending_dissipation(bed_));
   }
   const GrainRow* const grain = bed_.grain.data();
+  reserve(s, bed_.n, bed_.water.size());
+  std::size_t near = 0, at_planes = 0;  // contacts at most
+  for (const Chunk& chunk : bed_.chunks) {
+    for (const auto& candidates : chunk.candidates)
+      near += static_cast<std::size_t>(std::ranges::count_if(candidates, [&](const Candidate& c) {
+        return c.place != not_near && touch(bed_.sides, grain[c.i], grain[c.j]);
+      }));
+    at_planes += chunk.planes.size();
+  }
+  s.contacts.reserve(near), s.wall_contacts.reserve(at_planes);
   for (std::int64_t i = 0; i < bed_.water.size(); ++i) s.water_force.push_back(bed_.water.data()[i].f);
   for (Index i = 0; i < bed_.n; ++i) append_grain(s, grain[i], bed_.load.data()[i], bed_.part_of.data()[i]);
   for (const Chunk& chunk : bed_.chunks) {
