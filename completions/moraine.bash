@@ -12,10 +12,10 @@ _moraine() {
   done
   case $command in
     '') words="run sweep check keys bench export import-sphere watch figures report reproduce test --help --version --cuda" ;;
-    run) words="--resume --force --quiet --set --backend --threads --help" ;;
+    run) words="--resume --force --quiet --set --backend --threads --ranks --help" ;;
     sweep) words="--resume --force --quiet --set --at-once --backend --threads --help" ;;
     check) words="--set --backend --threads --help" ;;
-    bench) words="--steps --stage --set --backend --threads --help" ;;
+    bench) words="--steps --stage --set --backend --threads --ranks --help" ;;
     watch) words="--interval --once --time --png --no-png --help" ;;
     figures) words="--output --format --only --help" ;;
     report) words="--output --notes --help" ;;
@@ -27,7 +27,7 @@ _moraine() {
     --backend) words="cpu cuda auto" ;;
     --preset) words="paper standard fast" ;;
     --format) [[ $command == export ]] && words="csv lammps vtk" || return ;;
-    --set | --at-once | --threads | --steps | --stage | --interval | --only | --seeds | --cores | --settled) return ;;
+    --set | --at-once | --threads | --ranks | --steps | --stage | --interval | --only | --seeds | --cores | --settled) return ;;
   esac
   COMPREPLY=()
   if [[ ! $command || $word == -* || $previous == @(--backend|--preset|--format) ]]; then

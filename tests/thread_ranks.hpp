@@ -23,6 +23,7 @@ class PostOffice {
     const auto* first = static_cast<const std::byte*>(bytes);
     const std::lock_guard held(mutex_);
     boxes_[key].emplace_back(first, first + count);
+    ++messages_;
   }
   bool take(const Key& key, void* bytes, std::size_t most, std::size_t& count) {
     const std::lock_guard held(mutex_);
@@ -36,6 +37,10 @@ class PostOffice {
     box.pop_front();
     return true;
   }
+  std::int64_t messages() {
+    const std::lock_guard held(mutex_);
+    return messages_;
+  }
   bool empty() {
     const std::lock_guard held(mutex_);
     for (const auto& [key, box] : boxes_)
@@ -46,6 +51,7 @@ class PostOffice {
  private:
   std::mutex mutex_;
   std::map<Key, std::deque<std::vector<std::byte>>> boxes_;
+  std::int64_t messages_ = 0;
 };
 
 class ThreadRank final : public Ranks {
@@ -100,7 +106,8 @@ class ServingRanks {
     for (std::thread& t : serving_) t.join();
   }
   Ranks& first() { return *ranks_[0]; }
-  bool all_have_come() { return office_.empty(); }  // whether no message was sent for nothing
+  bool all_have_come() { return office_.empty(); }        // whether no message was sent for nothing
+  std::int64_t messages() { return office_.messages(); }  // so far
 
  private:
   PostOffice office_;

@@ -78,10 +78,10 @@ class Runner {
 
   Result run() {
     start_ = start_of(case_);  // with the engine, before anything of an earlier run is touched
-    engine_ = dem::make_engine(options_.backend, options_.threads, options_.ranks);
+    engine_ = make_engine();
     warnings_ = precheck(case_, start_, *engine_);
-    describes_ = engine_->describe();                                // with the threads that such a bed has
-    engine_ = dem::make_engine(options_.backend, options_.threads);  // lets go of the bed that was checked
+    describes_ = engine_->describe();  // with the threads that such a bed has
+    engine_ = make_engine();           // lets go of the bed that was checked
     make_directories(files_.output);
     const output::DirectoryLock lock(files_.output);
     const bool resuming = settle_old_output();
@@ -106,6 +106,10 @@ class Runner {
   }
 
  private:
+  std::unique_ptr<dem::Engine> make_engine() const {
+    return dem::make_engine(options_.backend, options_.threads, options_.ranks);
+  }
+
   // Resumes, refuses or clears what an earlier run has left. True if the run goes on from a checkpoint.
   bool settle_old_output() {
     if (options_.force) {

@@ -75,6 +75,8 @@ TEST_F(Mpi, SameFilesOnAnyNumberOfRanks) {
     SCOPED_TRACE(ranks);
     const fs::path many = make("on " + std::to_string(ranks), thousand());
     ASSERT_EQ(mpirun(on_ranks(ranks, with_threads(to_run(many), threads)))->wait(), 0) << said();
+    EXPECT_NE(contents(many / "output/log.txt").find(std::to_string(ranks) + " ranks of "),
+              std::string::npos);
     expect_same_results(one, many);
   }
 }

@@ -203,6 +203,9 @@ TEST_P(ReferenceBits, AreTheSame) {
     with.ranks = &ranks.first();
     expect_again(with.directory.filename(), computed(with));
     EXPECT_TRUE(ranks.all_have_come());
+    // Of each step some: the ranks have shared the work.
+    const auto rows = output::read_series(series_of(with.directory));
+    EXPECT_GT(ranks.messages(), 2 * static_cast<std::int64_t>(rows.back().step));
   }
   if (scene.again & pieces) expect_again("interrupted", computed_in_pieces());
   if (scene.again & margins)
