@@ -1,0 +1,66 @@
+"""A study on a cluster: Snakemake's profile in cases/cluster, what reproduce adds to it, and what it says of jobs that failed."""
+from pathlib import Path
+import re
+import shutil
+
+from .case import MissingData
+
+root = Path(__file__).resolve().parents[2]
+kept = root / "cases/cluster"   # profiles
+
+
+def profile(name):
+    """Directory of the profile of this name, or this directory."""
+    for directory in (kept / name, Path(name)):
+        if (directory / "config.yaml").exists():
+            directory = directory.resolve()
+            break
+    else:
+        known = ", ".join(sorted(p.parent.name for p in kept.glob("*/config.yaml")))
+        raise MissingData(f"--cluster {name}: expected one of {known}, or a directory with the config.yaml of a profile for Snakemake")
+    submit = re.search(r"\b(sbatch|qsub|bsub)\b", (directory / "config.yaml").read_text())
+    if submit and not shutil.which(submit[0]):
+        raise MissingData(f"--cluster {name}: {submit[0]} is not on the PATH; give this command on a machine from which jobs are submitted")
+    return directory
+
+
+def step(directory):
+    """The program of a profile that runs a command as a step of a job; or "env", which just runs it."""
+    return str(directory / "step") if (directory / "step").exists() else "env"
+
+
+def words(directory, cores):
+    """For Snakemake, in place of those for one machine. Jobs that a Snakemake which ended has left in the queue are followed, and
+    not submitted again; a file that says that a run has finished is good, whoever was there to see it."""
+    return ["--profile", str(directory), "--ignore-incomplete", *(["--cores", str(cores)] if cores else [])]
+
+
+def environment(options):
+    """What the profile's line for sbatch takes in."""
+    return {"MORAINE_SBATCH": options} if options else {}
+
+
+def unfinished(study):
+    """Lines about what has not finished: each case, its log, and the last error there; or what it waits for."""
+    home, lines = Path(study.home), []
+    for seed in study.seeds:
+        for name in study.wanted(seed):
+            if (home / study.done(name, seed)).exists():
+                continue
+            case, log = study.directory(name, seed), study.log(name, seed)
+            waits = [mark for mark in study.start(name, seed) if not (home / mark).exists()]
+            if waits:
+                lines.append(f"{case} has not begun: it starts from {study.directory(study.parts[name].start, seed)}")
+            elif not (home / log).exists():
+                lines.append(f"{case} has not begun: no job of it has run")
+            else:
+                lines.append(f"{case} has not finished: {last_error((home / log).read_text(errors='replace'))}; see {home / log}")
+    if not lines:
+        lines.append(f"the report was not written; see {home / study.report_log()}")
+    return lines
+
+
+def last_error(log):
+    """What the program or Slurm said last; of a job that was killed neither may have said anything."""
+    said = re.findall(r"^(?:moraine|slurmstepd|srun): (?:error: )?(.*\S)", log, re.MULTILINE)
+    return said[-1] if said else "its job was ended without a word of the program"
