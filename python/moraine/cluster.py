@@ -35,9 +35,9 @@ def words(directory, cores):
     return ["--profile", str(directory), "--ignore-incomplete", *(["--cores", str(cores)] if cores else [])]
 
 
-def environment(options):
-    """What the profile's line for sbatch takes in."""
-    return {"MORAINE_SBATCH": options} if options else {}
+def environment(directory, options):
+    """What a profile may ask for: where it lies, and more options for sbatch."""
+    return {"MORAINE_PROFILE": str(directory)} | ({"MORAINE_SBATCH": options} if options else {})
 
 
 def unfinished(study):
@@ -52,15 +52,18 @@ def unfinished(study):
             if waits:
                 lines.append(f"{case} has not begun: it starts from {study.directory(study.parts[name].start, seed)}")
             elif not (home / log).exists():
-                lines.append(f"{case} has not begun: no job of it has run")
+                lines.append(f"{case} has not begun: no job of it has run (if sbatch refused it, it says so above; if it waits, squeue says why)")
             else:
-                lines.append(f"{case} has not finished: {last_error((home / log).read_text(errors='replace'))}; see {home / log}")
+                job, error = last_words((home / log).read_text(errors="replace"))
+                lines.append(f"{case} has not finished: job {job}: {error}; see {home / log}")
     if not lines:
         lines.append(f"the report was not written; see {home / study.report_log()}")
     return lines
 
 
-def last_error(log):
-    """What the program or Slurm said last; of a job that was killed neither may have said anything."""
-    said = re.findall(r"^(?:moraine|slurmstepd|srun): (?:error: )?(.*\S)", log, re.MULTILINE)
-    return said[-1] if said else "its job was ended without a word of the program"
+def last_words(log):
+    """(number of the last job, what it said last of errors)."""
+    head, _, last = log.rpartition("\njob ") if "\njob " in log else ("", "", log.removeprefix("job "))
+    number = re.match(r"\d+", last)
+    said = [re.findall(rf"^(?:{who}): (?:error: )?(.*\S)", last, re.MULTILINE) for who in ("moraine|slurmstepd", "srun")]
+    return number[0] if number else "?", (said[0] or said[1] or ["was ended without a word of the program"])[-1]

@@ -35,7 +35,7 @@ def arguments(parser):
     parser.add_argument("--cluster", metavar="PROFILE",
                         help="run each case as a job of a cluster: slurm, which takes cases/cluster/slurm/config.yaml, or a directory with such a file")
     parser.add_argument("--cluster-options", default="", metavar="OPTIONS",
-                        help="more options for sbatch, in one word: --cluster-options '--partition=long --account=me'")
+                        help="more options for sbatch, in one word with =: --cluster-options='--partition=long --account=me'")
     parser.add_argument("--dry-run", action="store_true", help="say what would run")
 
 
@@ -109,6 +109,8 @@ def run(args):
     home = root / "cases" / args.NAME
     if not (home / "study.toml").exists():
         raise MissingData(f"there is no {home}/study.toml; studies: {', '.join(studies()) or 'none (they are in the repository)'}")
+    if args.cluster_options and not args.cluster:
+        raise MissingData("--cluster-options: they go with --cluster")
     study = study_of(args, home)  # first, so that what is wrong with it is said before anything is to be installed
     snakemake = shutil.which("snakemake")
     if not snakemake:
@@ -123,8 +125,9 @@ def run(args):
                "--nolock"]  # Snakemake's own lock outlives a power cut, and then wants to be removed by hand
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [str(root / "python"), os.environ.get("PYTHONPATH")]))}
     if args.cluster:
-        command += cluster.words(cluster.profile(args.cluster), args.cores)
-        environment |= cluster.environment(args.cluster_options)
+        profile = cluster.profile(args.cluster)
+        command += cluster.words(profile, args.cores)
+        environment |= cluster.environment(profile, args.cluster_options)
     else:
         command += ["--cores", str(args.cores or os.cpu_count()), "--rerun-incomplete"]
     if args.dry_run:
