@@ -121,7 +121,7 @@ def mpi(tree, slurm, scratch, check):
     subprocess.run(list(map(str, [tree.program, "run", cases[0], *short])), check=True, capture_output=True)
     status, said = job("mpirun", tree.program, "run", cases[1], *short)
     differs = different(cases[0] / "output", cases[1] / "output") if status == 0 else [said[-500:]]
-    check(not differs, f"Moraine on two ranks of a job: same bits as on one{differs and ': not ' + ', '.join(differs)}")
+    check(not differs, f"Moraine on two ranks of a job: same bits as on one{': not ' * bool(differs) + ', '.join(differs)}")
 
 
 def report(file, check, facts):

@@ -30,9 +30,8 @@ def step(directory):
 
 
 def words(directory, cores):
-    """For Snakemake, in place of those for one machine. Jobs that a Snakemake which ended has left in the queue are followed, and
-    not submitted again; a file that says that a run has finished is good, whoever was there to see it."""
-    return ["--profile", str(directory), "--ignore-incomplete", *(["--cores", str(cores)] if cores else [])]
+    """For Snakemake, beside those for one machine."""
+    return ["--profile", str(directory), *(["--cores", str(cores)] if cores else [])]
 
 
 def environment(directory, options):
@@ -52,7 +51,7 @@ def unfinished(study):
             if waits:
                 lines.append(f"{case} has not begun: it starts from {study.directory(study.parts[name].start, seed)}")
             elif not (home / log).exists():
-                lines.append(f"{case} has not begun: no job of it has run (if sbatch refused it, it says so above; if it waits, squeue says why)")
+                lines.append(f"{case} has not begun: it was not submitted; why, stands above")
             else:
                 job, error = last_words((home / log).read_text(errors="replace"))
                 lines.append(f"{case} has not finished: job {job}: {error}; see {home / log}")
@@ -62,8 +61,13 @@ def unfinished(study):
 
 
 def last_words(log):
-    """(number of the last job, what it said last of errors)."""
-    head, _, last = log.rpartition("\njob ") if "\njob " in log else ("", "", log.removeprefix("job "))
-    number = re.match(r"\d+", last)
-    said = [re.findall(rf"^(?:{who}): (?:error: )?(.*\S)", last, re.MULTILINE) for who in ("moraine|slurmstepd", "srun")]
-    return number[0] if number else "?", (said[0] or said[1] or ["was ended without a word of the program"])[-1]
+    """(number of the last job, what it said last of errors) of a log."""
+    number = (re.findall(r"^job (\d+) ", log, re.MULTILINE) or ["?"])[-1]
+    _, ran, last = ("\n" + log).rpartition(f"\njob {number} on ")  # again, if it was queued again
+    if not ran:
+        return number, "has not run; squeue or sacct say why"
+    for who in "moraine|slurmstepd", "srun":
+        said = re.findall(rf"^(?:{who}): (?:error: )?(.*(?:\n  .*)*)", last, re.MULTILINE)
+        if said:
+            return number, "; ".join(line.strip() for line in said[-1].splitlines()).replace(":; ", ": ")
+    return number, "was ended without a word of the program"

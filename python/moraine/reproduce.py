@@ -121,7 +121,7 @@ def run(args):
         check(study)
     command = [snakemake, "--snakefile", "../Snakefile", "--configfile", str(study.write_config()),
                # What has been computed stays valid when only words of the workflow change.
-               "--rerun-triggers", "mtime", "--keep-going",
+               "--rerun-triggers", "mtime", "--keep-going", "--rerun-incomplete",
                "--nolock"]  # Snakemake's own lock outlives a power cut, and then wants to be removed by hand
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [str(root / "python"), os.environ.get("PYTHONPATH")]))}
     if args.cluster:
@@ -129,7 +129,7 @@ def run(args):
         command += cluster.words(profile, args.cores)
         environment |= cluster.environment(profile, args.cluster_options)
     else:
-        command += ["--cores", str(args.cores or os.cpu_count()), "--rerun-incomplete"]
+        command += ["--cores", str(args.cores or os.cpu_count())]
     if args.dry_run:
         command.append("--dry-run")
     kept = [f.fileno() for f in held]

@@ -92,6 +92,7 @@ def test_the_profile_has_what_the_page_names(play):
     for key in ("jobs", "restart-times", "latency-wait"):
         assert f"| `{key}: {profile[key]}` |" in page
     assert profile["cluster-status"] == "status" and os.access(slurm / "status", os.X_OK) and os.access(slurm / "step", os.X_OK)
+    assert os.access(slurm / "submit", os.X_OK)
     text = profile["cluster"].format(rule="shear_1", threads=6, params=type("P", (), {"log": "runs/x.log"}))
     assert "--output=runs/x.log" in text and "--cpus-per-task=6" in text and text.endswith("$MORAINE_SBATCH")
 
@@ -139,17 +140,45 @@ def test_what_has_not_finished_is_named(tmp_path):
     for directory in of:
         directory.mkdir(parents=True)
     (of[0] / "bed.done").touch()
-    (of[0] / "shear.log").write_text("job 3 on n1, today\nmoraine: the first\njob 4 on n2, today\nmoraine: warning: a\nmoraine: bad bed\nsrun: error: n2: task 0: 1\n")
-    (of[1] / "bed.log").write_text("job 5 on n1, today\n0.3 %\n")
+    (of[0] / "shear.log").write_text("job 3 submitted\njob 3 on n1, today\nmoraine: the first\njob 4 submitted\njob 4 on n2, today\nmoraine: warning: a\n"
+                                     "moraine: bad bed\nsrun: error: n2: task 0: 1\n")
+    (of[1] / "bed.log").write_text("job 5 submitted\njob 5 on n1, today\n0.3 %\n")
     assert cluster.unfinished(study) == [
         f"runs/fast/seed-1/shear has not finished: job 4: bad bed; see {of[0]}/shear.log",
         f"runs/fast/seed-2/bed has not finished: job 5: was ended without a word of the program; see {of[1]}/bed.log",
         "runs/fast/seed-2/shear has not begun: it starts from runs/fast/seed-2/bed",
-        "runs/fast/seed-3/bed has not begun: no job of it has run (if sbatch refused it, it says so above; if it waits, squeue says why)",
+        "runs/fast/seed-3/bed has not begun: it was not submitted; why, stands above",
         "runs/fast/seed-3/shear has not begun: it starts from runs/fast/seed-3/bed"]
-    assert cluster.last_words("job 8 on n\nslurmstepd: error: *** JOB 8 ON n CANCELLED DUE TO TIME LIMIT ***\nsrun: error: x\n") == \
+
+
+def test_last_words_of_jobs():
+    def of_job(said):
+        return cluster.last_words(f"job 7 submitted\njob 7 on m\nmoraine: earlier\njob 8 submitted\n{said}")
+    assert of_job("job 8 on n\nslurmstepd: error: *** JOB 8 ON n CANCELLED DUE TO TIME LIMIT ***\nsrun: error: x\n") == \
         ("8", "*** JOB 8 ON n CANCELLED DUE TO TIME LIMIT ***")
-    assert cluster.last_words("job 9 on n\nsrun: error: n: task 0: Killed\n") == ("9", "n: task 0: Killed")
+    assert of_job("job 8 on n\nsrun: error: n: task 0: Killed\n") == ("8", "n: task 0: Killed")
+    assert of_job("job 8 on n\nmoraine: 2 of 3 cases did not finish:\n  a: bad\n  b: not begun\n[Thu]") == \
+        ("8", "2 of 3 cases did not finish: a: bad; b: not begun")
+    assert of_job("") == ("8", "has not run; squeue or sacct say why")
+
+
+@pytest.mark.parametrize("state, number", [("RUNNING", "12"), ("PENDING", "12"), ("FAILED", "13"), ("CANCELLED", "13"), ("COMPLETED", "13")])
+def test_a_job_left_in_the_queue_is_followed(play, tmp_path, state, number):
+    play("scontrol", f'[[ $4 == 12 ]] && echo "JobId=12 JobState={state} "')
+    play("sbatch", f'echo "$*" >{tmp_path}/words; echo "13;there"')
+    log = tmp_path / "a.log"
+    log.write_text("job 11 submitted, then\njob 12 on n, then\n")
+    assert said_by("submit", log, "sbatch", "--time=1", "a script").stdout == number + "\n"
+    if number == "13":
+        assert (tmp_path / "words").read_text() == "--time=1 a script\n" and "\njob 13 submitted, " in log.read_text()
+
+
+def test_the_first_job(play, tmp_path):
+    play("sbatch", '[[ $1 == good ]] && echo 1 || { echo "sbatch: error: no" >&2; exit 1; }')
+    done = said_by("submit", tmp_path / "a.log", "sbatch", "bad")
+    assert done.returncode == 1 and "sbatch: error: no" in done.stderr and not (tmp_path / "a.log").exists()
+    assert said_by("submit", tmp_path / "a.log", "sbatch", "good").stdout == "1\n"
+    assert (tmp_path / "a.log").read_text().startswith("job 1 submitted, ")
 
 
 def test_the_profile_of_snakemake_8_says_the_same(play):
