@@ -44,6 +44,7 @@ def files_outside():
     for top in "/etc", "/var/spool", "/var/log", "/var/lib/slurm", "/var/lib/munge", "/run", "/dev/shm", "/var/tmp", root / "cases", root / "python":
         for directory, folders, files in os.walk(top):
             found.update(Path(directory, name) for name in (*folders, *files))
+    found = {p for p in found if not p.name.startswith("vader_segment")}  # of other programs' MPI; ours lie in the scratch directory
     home = Path.home()  # others of this user's programs may be at work there, and in /tmp
     words = ("slurm", "munge", "snake", "ompi", "openmpi", "pmi", "hwloc", "moraine", "matplotlib")
     for top in home, home / ".config", home / ".cache", home / ".local/share", Path("/tmp"):
