@@ -19,7 +19,7 @@ _moraine() {
     watch) words="--interval --once --time --png --no-png --help" ;;
     figures) words="--output --format --only --help" ;;
     report) words="--output --notes --help" ;;
-    reproduce) words="--preset --seeds --quick --set --settled --output --cores --gpu --dry-run --help" ;;
+    reproduce) words="--preset --seeds --quick --set --settled --output --cores --gpu --cluster --cluster-options --dry-run --help" ;;
     export) words="--format --output --help" ;;
     import-sphere | keys) words="--help" ;;
   esac

@@ -4,8 +4,10 @@ import fcntl
 import os
 import re
 import shutil
+import signal
 import subprocess
 
+from . import cluster
 from .case import MissingData
 from .study import Study, read
 
@@ -28,8 +30,12 @@ def arguments(parser):
     parser.add_argument("--settled", default="", metavar="STUDY",
                         help="shear the beds that this study has settled (such as fast) instead of settling them again")
     parser.add_argument("--output", metavar="DIR", help="of the report (default: runs/STUDY/results beside the Snakefile)")
-    parser.add_argument("--cores", type=int, default=os.cpu_count(), help="CPU cores to use (default: all, %(default)s)")
+    parser.add_argument("--cores", type=int, help=f"CPU cores to use (default: all, {os.cpu_count()}; on a cluster as many as it has)")
     parser.add_argument("--gpu", action="store_true", help="on one GPU, all runs of a case and seed at once")
+    parser.add_argument("--cluster", metavar="PROFILE",
+                        help="run each case as a job of a cluster: slurm, which takes cases/cluster/slurm/config.yaml, or a directory with such a file")
+    parser.add_argument("--cluster-options", default="", metavar="OPTIONS",
+                        help="more options for sbatch, in one word with =: --cluster-options='--partition=long --account=me'")
     parser.add_argument("--dry-run", action="store_true", help="say what would run")
 
 
@@ -57,9 +63,13 @@ def study_of(args, home):
             raise MissingData(f"--set {text}: expected the full name of the key, such as wall.mass; ./moraine keys lists them")
         else:
             settings[key] = value
+    moraine, step = os.environ.get("MORAINE_LAUNCHER", str(root / "moraine")), ""
+    if args.cluster:
+        step = cluster.step(cluster.profile(args.cluster))
+        if moraine == str(root / "moraine") and (root / "build/moraine").exists():
+            moraine = str(root / "build/moraine")  # nodes need nothing to build with
     return Study(home, args.preset, seeds(args.seeds) if args.seeds else [], args.quick, settings, lists, args.settled,
-                 str(Path(args.output).resolve()) if args.output else "", gpu=args.gpu,
-                 moraine=os.environ.get("MORAINE_LAUNCHER", str(root / "moraine")))
+                 str(Path(args.output).resolve()) if args.output else "", gpu=args.gpu, moraine=moraine, step=step)
 
 
 def hold(study):
@@ -99,6 +109,8 @@ def run(args):
     home = root / "cases" / args.NAME
     if not (home / "study.toml").exists():
         raise MissingData(f"there is no {home}/study.toml; studies: {', '.join(studies()) or 'none (they are in the repository)'}")
+    if args.cluster_options and not args.cluster:
+        raise MissingData("--cluster-options: they go with --cluster")
     study = study_of(args, home)  # first, so that what is wrong with it is said before anything is to be installed
     snakemake = shutil.which("snakemake")
     if not snakemake:
@@ -107,14 +119,28 @@ def run(args):
     if not args.dry_run:
         study.write_cases()
         check(study)
-    command = [snakemake, "--snakefile", "../Snakefile", "--cores", str(args.cores), "--configfile", str(study.write_config()),
+    command = [snakemake, "--snakefile", "../Snakefile", "--configfile", str(study.write_config()),
                # What has been computed stays valid when only words of the workflow change.
                "--rerun-triggers", "mtime", "--keep-going", "--rerun-incomplete",
                "--nolock"]  # Snakemake's own lock outlives a power cut, and then wants to be removed by hand
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [str(root / "python"), os.environ.get("PYTHONPATH")]))}
+    if args.cluster:
+        profile = cluster.profile(args.cluster)
+        command += cluster.words(profile, args.cores)
+        environment |= cluster.environment(profile, args.cluster_options)
+    else:
+        command += ["--cores", str(args.cores or os.cpu_count())]
     if args.dry_run:
         command.append("--dry-run")
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [str(root / "python"), os.environ.get("PYTHONPATH")]))}
-    status = subprocess.run(command, cwd=home, env=environment, pass_fds=[f.fileno() for f in held]).returncode
+    kept = [f.fileno() for f in held]
+    if args.cluster:
+        with subprocess.Popen(command, cwd=home, env=environment, pass_fds=kept) as process:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for Snakemake, which cancels its jobs and then ends
+            status = process.wait()
+    else:
+        status = subprocess.run(command, cwd=home, env=environment, pass_fds=kept).returncode
     if status == 0 and not args.dry_run:
         print(f"report: {home / 'runs' / study.name / 'results' if not args.output else Path(args.output)}/report.html")
+    if status and args.cluster and not args.dry_run:
+        raise MissingData("\nmoraine: ".join([*cluster.unfinished(study), "the same command goes on with what is missing"]))
     return status

@@ -127,6 +127,7 @@ class Study:
     moraine: str = "../../moraine"
     python: str = sys.executable    # one that has what `moraine report` imports; Snakemake's own may not
     gpu: bool = False
+    step: str = ""                  # program that runs a command as a step of a job; set where jobs go to a cluster
 
     def __post_init__(self):
         what = read(self.home)
@@ -182,6 +183,14 @@ class Study:
         values = "+".join([name, *(f"{key.rpartition('.')[2]}-{safe(text)}" for key, text in self.parts[name].lists.items())])
         return f"{self.directory(name, seed).parent}/{values}.done"
 
+    def log(self, name, seed):
+        """Where a job on a cluster writes, beside the file that says it has finished. For Snakemake a parameter, not a log, which the
+        job would begin by removing."""
+        return self.done(name, seed).removesuffix(".done") + ".log"
+
+    def report_log(self):
+        return f"runs/{self.name}/report.log"
+
     def start(self, name, seed):
         """Of these files a case needs the first, if any."""
         start = self.parts[name].start
@@ -201,7 +210,7 @@ class Study:
         """Words of the command that computes what is missing of a case."""
         lists = self.parts[name].lists
         sets = [word for key, text in lists.items() for word in ("--set", f"{key}={text}")]
-        return [self.moraine, "sweep" if lists else "run", str(self.directory(name, seed)), *sets, "--resume", "--threads", str(threads),
+        return [*filter(None, [self.step]), self.moraine, "sweep" if lists else "run", str(self.directory(name, seed)), *sets, "--resume", "--threads", str(threads),
                 "--backend", "cuda" if self.gpu else "cpu"]
 
     def report_command(self):

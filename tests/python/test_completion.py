@@ -29,7 +29,7 @@ def test_commands():
     ("export", "--format --output --help"),
     ("watch", "--interval --once --time --png --no-png --help"),
     ("figures", "--output --format --only --help"),
-    ("reproduce", "--preset --seeds --quick --set --settled --output --cores --gpu --dry-run --help"),
+    ("reproduce", "--preset --seeds --quick --set --settled --output --cores --gpu --cluster --cluster-options --dry-run --help"),
 ])
 def test_options(command, options):
     assert complete(*command.split(), "-") == options.split()
