@@ -120,9 +120,21 @@ def mpi(tree, slurm, scratch, check):
         shutil.copytree(tree.directory / "cases/quick-shear", case, ignore=shutil.ignore_patterns("output"))
     short = ["--threads", 1, "--set", "stage.shear.strain=0.05"]
     subprocess.run(list(map(str, [tree.program, "run", cases[0], *short])), check=True, capture_output=True)
-    status, said = job("mpirun", tree.program, "run", cases[1], *short)
+    # As at a time limit with --signal=B:USR1@SECONDS: Slurm tells the batch script, which mpirun has become.
+    words = ["exec mpirun", tree.program, "run", cases[1], *short]
+    number = subprocess.run(["sbatch", "--parsable", "--ntasks=2", f"--output={scratch / 'mpi.log'}", "--wrap", " ".join(map(str, words))],
+                            env=slurm.environment, cwd=scratch, check=True, capture_output=True, text=True).stdout.strip()
+    while not (cases[1] / "output/checkpoint.h5").exists():
+        time.sleep(0.1)
+    time.sleep(3)
+    subprocess.run(["scancel", "--batch", "--signal=USR1", number], env=slurm.environment, check=True)
+    while subprocess.run(["squeue", "--noheader", "--jobs", number], env=slurm.environment, capture_output=True, text=True).stdout.strip():
+        time.sleep(0.2)
+    stopped = "--resume goes on from here" in (scratch / "mpi.log").read_text()
+    check(stopped, "two ranks of a job: SIGUSR1 to its batch script, as before a time limit, leaves a checkpoint")
+    status, said = job("mpirun", tree.program, "run", cases[1], "--resume", *short)
     differs = different(cases[0] / "output", cases[1] / "output") if status == 0 else [" ".join(said.split())[-300:]]
-    check(not differs, f"Moraine on two ranks of a job: same bits as on one{': not ' * bool(differs) + ', '.join(differs)}")
+    check(not differs, f"Moraine on two ranks of a job, resumed: same bits as on one{': not ' * bool(differs) + ', '.join(differs)}")
 
 
 def report(file, check, facts):
