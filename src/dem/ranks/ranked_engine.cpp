@@ -40,6 +40,7 @@ class RankPart {
     part.first = part.first_chunk() * chunk_size(part.all);
     State state;
     get_part(parcel, state);
+    parcel = {};  // of a large bed it is large
     scene_ = l.scene;
     engine_ = std::make_unique<cpu::PairEngine>(l.threads);
     engine_->load_part(l.scene, state, part, l.bodies, std::move(water));
