@@ -1,12 +1,13 @@
 // Ranks (src/ranks/ranks.hpp) that are threads of one process, to test what several ranks do without MPI.
 #pragma once
-#include <array>
+#include <atomic>
 #include <cstring>
 #include <deque>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <tuple>
 #include <vector>
@@ -15,25 +16,29 @@
 
 namespace moraine {
 
-// Messages on their way, by where they come from, where they go, and tag.
+// Messages on their way, by where they come from, where they go, and tag. Bytes stay with the sender until
+// they are taken, as with a large message of MPI: who waits for a message to go while the other does so, too,
+// waits for ever, and who changes it meanwhile sends something else.
 class PostOffice {
  public:
   using Key = std::tuple<int, int, Tag>;
-  void put(const Key& key, const void* bytes, std::size_t count) {
-    const auto* first = static_cast<const std::byte*>(bytes);
+  using Taken = std::shared_ptr<std::atomic<bool>>;
+  Taken put(const Key& key, const void* bytes, std::size_t count) {
     const std::lock_guard held(mutex_);
-    boxes_[key].emplace_back(first, first + count);
     ++messages_;
+    return boxes_[key].emplace_back(Letter{bytes, count, std::make_shared<std::atomic<bool>>(false)}).taken;
   }
   bool take(const Key& key, void* bytes, std::size_t most, std::size_t& count) {
     const std::lock_guard held(mutex_);
     auto& box = boxes_[key];
     if (box.empty()) return false;
-    count = box.front().size();
+    const Letter letter = box.front();
+    count = letter.count;
     if (count > most)
       throw std::logic_error("a message of tag " + std::to_string(int(std::get<2>(key))) + " has " +
                              std::to_string(count) + " bytes, " + std::to_string(most) + " were expected");
-    std::memcpy(bytes, box.front().data(), count);
+    std::memcpy(bytes, letter.bytes, count);
+    letter.taken->store(true);
     box.pop_front();
     return true;
   }
@@ -49,8 +54,13 @@ class PostOffice {
   }
 
  private:
+  struct Letter {
+    const void* bytes;
+    std::size_t count;
+    Taken taken;
+  };
   std::mutex mutex_;
-  std::map<Key, std::deque<std::vector<std::byte>>> boxes_;
+  std::map<Key, std::deque<Letter>> boxes_;
   std::int64_t messages_ = 0;
 };
 
@@ -61,22 +71,23 @@ class ThreadRank final : public Ranks {
   int size() const override { return size_; }
   int on_this_host() const override { return size_; }
   Message send(int to, Tag tag, const void* bytes, std::size_t count) override {
-    office_.put({rank_, to, tag}, bytes, count);
-    return {};
+    sent_[++last_] = office_.put({rank_, to, tag}, bytes, count);
+    return {last_, 0};
   }
   Message receive(int from, Tag tag, void* bytes, std::size_t most) override {
-    expected_.push_back({{from, rank_, tag}, bytes, most, ++last_});
+    expected_[++last_] = {{from, rank_, tag}, bytes, most};
     return {last_, 0};
   }
   bool done(Message& message) override {
-    for (std::size_t k = 0; k < expected_.size(); ++k) {
-      if (expected_[k].request != message.request) continue;
-      const Expected& e = expected_[k];
+    if (const auto sent = sent_.find(message.request); sent != sent_.end()) {
+      if (!sent->second->load()) return false;
+      sent_.erase(sent);
+    } else if (const auto at = expected_.find(message.request); at != expected_.end()) {
+      const Expected& e = at->second;
       if (!office_.take(e.key, e.bytes, e.most, message.bytes)) return false;
-      expected_.erase(expected_.begin() + static_cast<std::ptrdiff_t>(k));
-      message.request = 0;
-      break;
+      expected_.erase(at);
     }
+    message.request = 0;
     return true;
   }
   void abort(const std::string& words) override { throw std::logic_error("rank aborts: " + words); }
@@ -86,11 +97,11 @@ class ThreadRank final : public Ranks {
     PostOffice::Key key;
     void* bytes;
     std::size_t most;
-    std::uintptr_t request;
   };
   PostOffice& office_;
   int rank_, size_;
-  std::vector<Expected> expected_;
+  std::map<std::uintptr_t, PostOffice::Taken> sent_;
+  std::map<std::uintptr_t, Expected> expected_;
   std::uintptr_t last_ = 0;
 };
 

@@ -47,14 +47,16 @@ void Ranks::broadcast(void* bytes, std::size_t count) {
   for (Message& m : messages) wait(m);
 }
 
-void Parcel::send(Ranks& ranks, int to) const {
-  const std::size_t size = bytes_.size();
-  Ranks::Message head = ranks.send(to, Tag::parcel, &size, sizeof size);
-  ranks.wait(head);
-  for (std::size_t at = 0; at < size; at += most_at_once) {
-    Ranks::Message piece = ranks.send(to, Tag::parcel, bytes_.data() + at, std::min(most_at_once, size - at));
-    ranks.wait(piece);
-  }
+void Parcel::post(Ranks& ranks, int to) {
+  size_ = bytes_.size();
+  messages_.push_back(ranks.send(to, Tag::parcel, &size_, sizeof size_));
+  for (std::size_t at = 0; at < size_; at += most_at_once)
+    messages_.push_back(ranks.send(to, Tag::parcel, bytes_.data() + at, std::min(most_at_once, size_ - at)));
+}
+
+void Parcel::wait(Ranks& ranks) {
+  for (Ranks::Message& m : messages_) ranks.wait(m);
+  messages_.clear();
 }
 
 Parcel Parcel::from(Ranks& ranks, int from, bool at_rest) {

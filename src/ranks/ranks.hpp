@@ -93,12 +93,16 @@ class Parcel {
     at_ += count * sizeof(T);
   }
 
-  void send(Ranks& ranks, int to) const;
+  // On its way until wait(); the parcel stays where it is.
+  void post(Ranks& ranks, int to);
+  void wait(Ranks& ranks);
+  void send(Ranks& ranks, int to) { post(ranks, to), wait(ranks); }
   static Parcel from(Ranks& ranks, int from, bool at_rest = false);
 
  private:
   std::vector<std::byte> bytes_;
-  std::size_t at_ = 0;
+  std::size_t at_ = 0, size_ = 0;
+  std::vector<Ranks::Message> messages_;
 };
 
 // The number that rank 0 has.

@@ -1,7 +1,9 @@
 // The part of Traffic that a search has: which grains of other ranks a rank must know.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <list>
 
 #include "dem/cpu/traffic.hpp"
 #include "dem/neighbours.hpp"
@@ -51,35 +53,58 @@ CellGrid coarse_grid(const Bed& bed, const Extent& extent) {
   return grid;
 }
 
+// Calls use(cell) for it and those beside it, until that returns true.
+template <class Use>
+void around(const CellGrid& grid, const std::array<std::int32_t, 3>& at, Use&& use) {
+  std::int32_t low[3], high[3];
+  for (int a = 0; a < 3; ++a) {
+    const bool periodic = grid.sides.side[a] > 0;
+    low[a] = periodic ? at[a] - 1 : std::max(at[a] - 1, 0);
+    high[a] = periodic ? at[a] + 1 : std::min(at[a] + 1, grid.n[a] - 1);
+  }
+  const auto wrapped = [&](int a, std::int32_t c) { return (c + grid.n[a]) % grid.n[a]; };
+  for (std::int32_t z = low[2]; z <= high[2]; ++z)
+    for (std::int32_t y = low[1]; y <= high[1]; ++y)
+      for (std::int32_t x = low[0]; x <= high[0]; ++x)
+        if (use((wrapped(2, z) * grid.n[1] + wrapped(1, y)) * grid.n[0] + wrapped(0, x))) return;
+}
+
 class CellSet {
  public:
   CellSet(const CellGrid& grid, const std::uint64_t* bits) : grid_(grid), bits_(bits) {}
   bool has(std::int32_t cell) const { return bits_[cell / 64] >> (cell % 64) & 1; }
-  // Whether it has the cell or one beside it.
+  // Whether it has the grain's cell or one beside it.
   bool has_near(const Vec3d& x) const {
-    std::int32_t low[3], high[3];
-    for (int a = 0; a < 3; ++a) {
-      const std::int32_t c = grid_.along(a, x[a]);
-      const bool periodic = grid_.sides.side[a] > 0;
-      low[a] = periodic ? c - 1 : std::max(c - 1, 0);
-      high[a] = periodic ? c + 1 : std::min(c + 1, grid_.n[a] - 1);
-    }
-    for (std::int32_t z = low[2]; z <= high[2]; ++z)
-      for (std::int32_t y = low[1]; y <= high[1]; ++y)
-        for (std::int32_t c = low[0]; c <= high[0]; ++c)
-          if (has((wrapped(2, z) * grid_.n[1] + wrapped(1, y)) * grid_.n[0] + wrapped(0, c))) return true;
-    return false;
+    bool found = false;
+    around(grid_, {grid_.along(0, x.x), grid_.along(1, x.y), grid_.along(2, x.z)},
+           [&](std::int32_t cell) { return found = has(cell); });
+    return found;
   }
 
  private:
-  std::int32_t wrapped(int a, std::int32_t c) const { return (c + grid_.n[a]) % grid_.n[a]; }
   const CellGrid& grid_;
   const std::uint64_t* bits_;
 };
 
+// With the cells beside them.
+std::vector<std::uint64_t> grown(const CellGrid& grid, const std::uint64_t* bits, std::size_t words) {
+  std::vector<std::uint64_t> out(words);
+  const CellSet cells(grid, bits);
+  for (std::int32_t z = 0, cell = 0; z < grid.n[2]; ++z)
+    for (std::int32_t y = 0; y < grid.n[1]; ++y)
+      for (std::int32_t x = 0; x < grid.n[0]; ++x, ++cell)
+        if (cells.has(cell))
+          around(grid, {x, y, z}, [&](std::int32_t c) {
+            out[c / 64] |= std::uint64_t{1} << (c % 64);
+            return false;
+          });
+  return out;
+}
+
 }  // namespace
 
 void Traffic::fetch_ghosts(Bed& bed) {
+  finish();
   // What candidates know is by number from here on, as rows of ghosts change.
   for (Chunk& chunk : bed.chunks)
     for (Candidate& c : chunk.candidates[1]) c.j = bed.number(c.j);
@@ -96,26 +121,39 @@ void Traffic::fetch_ghosts(Bed& bed) {
   }
   ranks_.gather(bits.data(), begin);
 
+  // Ranks that have no cell beside one of its own share no pairs with it; both see that.
+  const std::vector<std::uint64_t> beside = grown(grid, own, words);
+  const auto is_near = [&](int r) {
+    const std::uint64_t* const theirs = bits.data() + words * r;
+    for (std::size_t w = 0; w < words; ++w)
+      if (beside[w] & theirs[w]) return true;
+    return false;
+  };
+  std::list<Parcel> parcels;  // each rank sends before it receives, so none may wait for another meanwhile
+  earlier_.clear();
   for (int r = 0; r < ranks_.rank(); ++r) {
+    if (!is_near(r)) continue;
+    earlier_.push_back({.rank = r});
     const CellSet theirs(grid, bits.data() + words * r);
     const Index their_first = bed.order.begin_of(bed.part.first_chunks[r]);
-    Parcel parcel;
     std::vector<Bed::Ghost> ghosts;
     for (Index i = 0; i < bed.n; ++i)
       if (theirs.has_near(bed.grain.data()[i].x))
         ghosts.push_back(
             {bed.grain.data()[i], bed.part.first + i - their_first, bed.part_of[i], bed.material_of(i)});
-    parcel.put_list(ghosts);
-    parcel.send(ranks_, r);
+    parcels.emplace_back().put_list(ghosts);
+    parcels.back().post(ranks_, r);
   }
   std::vector<Bed::Ghost> ghosts;
   later_.clear();
   for (int r = ranks_.rank() + 1; r < ranks_.size(); ++r) {
+    if (!is_near(r)) continue;
     const auto first = static_cast<Index>(ghosts.size());
     Parcel::from(ranks_, r).add_to(ghosts);
     later_.push_back(
         {.rank = r, .first_ghost = bed.n + first, .ghosts = static_cast<Index>(ghosts.size()) - first});
   }
+  for (Parcel& parcel : parcels) parcel.wait(ranks_);
   bed.set_ghosts(ghosts);
 }
 
@@ -142,6 +180,7 @@ std::vector<Outgoing> Traffic::keep_ghosts(Bed& bed) {
 
   // Their owners are told which rows to send, and what links come to them.
   const Index first_chunk = bed.part.first_chunk();
+  std::list<Parcel> parcels;
   for (const Later& l : later_) {
     std::vector<Index> wanted;
     const Index other = bed.part.first_chunks[l.rank],
@@ -153,20 +192,20 @@ std::vector<Outgoing> Traffic::keep_ghosts(Bed& bed) {
       for (const Outgoing& out : chunk.outgoing)
         if (const Index to = first_chunk + out.to; to >= other && to < bed.part.first_chunks[l.rank + 1])
           links.push_back({to - other, out.size});
-    Parcel parcel;
+    Parcel& parcel = parcels.emplace_back();
     parcel.put_list(wanted), parcel.put_list(links);
-    parcel.send(ranks_, l.rank);
+    parcel.post(ranks_, l.rank);
   }
   std::erase_if(later_, [](const Later& l) { return l.ghosts == 0; });
-  earlier_.clear();
   std::vector<Outgoing> from_others;
-  for (int r = 0; r < ranks_.rank(); ++r) {
-    Parcel parcel = Parcel::from(ranks_, r);
-    Earlier e{.rank = r, .first_link = static_cast<Index>(from_others.size())};
+  for (Earlier& e : earlier_) {
+    Parcel parcel = Parcel::from(ranks_, e.rank);
+    e.first_link = static_cast<Index>(from_others.size());
     parcel.add_to(e.wanted), parcel.add_to(from_others);
     e.links = static_cast<Index>(from_others.size()) - e.first_link;
-    if (!e.wanted.empty()) earlier_.push_back(std::move(e));
   }
+  std::erase_if(earlier_, [](const Earlier& e) { return e.wanted.empty(); });
+  for (Parcel& parcel : parcels) parcel.wait(ranks_);
   return from_others;
 }
 

@@ -86,6 +86,11 @@ void Traffic::progress(Bed& bed, std::int64_t step) {
   }
 }
 
+void Traffic::finish() {
+  for (Earlier& e : earlier_) ranks_.wait(e.rows_out);
+  for (Later& l : later_) ranks_.wait(l.shares_out);
+}
+
 void Traffic::take_rows(Bed& bed, Later& from) {
   const double* at = from.rows.data();
   for (Index i = from.first_ghost; i < from.first_ghost + from.ghosts; ++i, at += numbers_) {

@@ -23,6 +23,9 @@ namespace moraine::dem::cpu {
 class Traffic {
  public:
   explicit Traffic(Ranks& ranks) : ranks_(ranks) {}
+  ~Traffic() { finish(); }
+  Traffic(const Traffic&) = delete;
+  Traffic& operator=(const Traffic&) = delete;
 
   // At a search, in this order; on all ranks together. Throws Error on all of them if a coordinate is not
   // finite.
@@ -70,9 +73,8 @@ class Traffic {
     Ranks::Message rows_out, shares_in;
     bool has_shares = false;
   };
-  // Cells of a coarse grid over the bed in which a rank has grains, bit by bit.
-  using Cells = std::vector<std::uint64_t>;
 
+  void finish();  // waits until what was sent in the last step has gone
   void take_rows(Bed& bed, Later& from);
   void send_shares(const Bed& bed, Later& to);
   void take_shares(Bed& bed, Earlier& from);
