@@ -1,8 +1,11 @@
-// For bench/scaling: what MPI and the pieces of a step take that `moraine bench` does not show, in s, as one line of JSON.
+// For bench/scaling: what MPI and the pieces of a step take that `moraine bench` does not show, in s, as one
+// line of JSON.
 //
-//   mpirun -n 2 times    one way of a message of 8 bytes and of 1 MB; an isend and an irecv without waiting; a gather of all to all
+//   mpirun -n 2 times    one way of a message of 8 bytes and of 1 MB; an isend and an irecv without waiting;
+//   a gather of all to all
 //
-// The pieces are written after src/dem/cpu/ghosts.cpp (CellSet::has_near), traffic.cpp (rows, tallies) and bed.cpp (sums).
+// The pieces are written after src/dem/cpu/ghosts.cpp (CellSet::has_near), traffic.cpp (rows, tallies) and
+// bed.cpp (sums).
 #include <mpi.h>
 
 #include <algorithm>
@@ -21,7 +24,8 @@ double seconds(int times, Act&& act) {
   for (int turn = 0; turn < 5; ++turn) {
     const auto began = std::chrono::steady_clock::now();
     for (int k = 0; k < times; ++k) act(k);
-    least = std::min(least, std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count() / times);
+    least = std::min(least,
+                     std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count() / times);
   }
   return least;
 }
@@ -30,22 +34,23 @@ volatile double sink;
 
 double one_way(int rank, std::vector<char>& bytes, int count, int times) {
   return 0.5 * seconds(times, [&](int) {
-    MPI_Status status;
-    if (rank == 0) {
-      MPI_Send(bytes.data(), count, MPI_BYTE, 1, 0, MPI_COMM_WORLD);
-      MPI_Recv(bytes.data(), count, MPI_BYTE, 1, 0, MPI_COMM_WORLD, &status);
-    } else if (rank == 1) {
-      MPI_Recv(bytes.data(), count, MPI_BYTE, 0, 0, MPI_COMM_WORLD, &status);
-      MPI_Send(bytes.data(), count, MPI_BYTE, 0, 0, MPI_COMM_WORLD);
-    }
-  });
+           MPI_Status status;
+           if (rank == 0) {
+             MPI_Send(bytes.data(), count, MPI_BYTE, 1, 0, MPI_COMM_WORLD);
+             MPI_Recv(bytes.data(), count, MPI_BYTE, 1, 0, MPI_COMM_WORLD, &status);
+           } else if (rank == 1) {
+             MPI_Recv(bytes.data(), count, MPI_BYTE, 0, 0, MPI_COMM_WORLD, &status);
+             MPI_Send(bytes.data(), count, MPI_BYTE, 0, 0, MPI_COMM_WORLD);
+           }
+         });
 }
 
 double gather(int size, std::vector<char>& bytes, int all, int times) {
   std::vector<int> counts(size, all / size), first(size);
   for (int r = 0; r < size; ++r) first[r] = r * (all / size);
   return seconds(times, [&](int) {
-    MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_BYTE, bytes.data(), counts.data(), first.data(), MPI_BYTE, MPI_COMM_WORLD);
+    MPI_Allgatherv(MPI_IN_PLACE, 0, MPI_BYTE, bytes.data(), counts.data(), first.data(), MPI_BYTE,
+                   MPI_COMM_WORLD);
   });
 }
 
@@ -55,7 +60,8 @@ double look() {
   const std::vector<std::uint64_t> bits((n * n * n + 63) / 64);
   std::vector<double> x(3 * grains);
   std::uint64_t random = 1;
-  for (double& value : x) random = random * 6364136223846793005u + 1442695040888963407u, value = (random >> 11) * 0x1p-53;
+  for (double& value : x)
+    random = random * 6364136223846793005u + 1442695040888963407u, value = (random >> 11) * 0x1p-53;
   int found = 0;
   const double s = seconds(1, [&](int) {
     for (int i = 0; i < grains; ++i) {
@@ -87,7 +93,8 @@ double tally() {
   std::vector<Tally> tallies(chunks);
   const double s = seconds(3, [&](int) {
     const double* from = all.data();
-    for (Tally& t : tallies) std::memcpy(t.force, from, 16), std::memcpy(t.lost, from + 2, 16), from += of_chunk;
+    for (Tally& t : tallies)
+      std::memcpy(t.force, from, 16), std::memcpy(t.lost, from + 2, 16), from += of_chunk;
     for (int k = 0; k < of_chunk; ++k) {
       double sum = 0;
       for (const Tally& t : tallies) sum += k < 2 ? t.force[k] : t.lost[k - 2];
@@ -106,7 +113,9 @@ double row() {
   std::vector<double> grain(16 * rows, 1.0), to(numbers * wanted);
   std::uint64_t random = 1;
   std::vector<int> list(wanted);
-  for (int& i : list) random = random * 6364136223846793005u + 1442695040888963407u, i = static_cast<int>((random >> 33) % rows);
+  for (int& i : list)
+    random = random * 6364136223846793005u + 1442695040888963407u,
+    i = static_cast<int>((random >> 33) % rows);
   std::sort(list.begin(), list.end());
   const double s = seconds(20, [&](int) {
     double* at = to.data();
@@ -128,26 +137,34 @@ int main(int count, char** words) {
   constexpr int large = 1 << 20, small = 4'000, middling = 40'000;
   std::vector<char> bytes(2 * large);
   const double short_way = one_way(rank, bytes, 8, 10'000), long_way = one_way(rank, bytes, large, 200);
-  const double tiny_gather = gather(size, bytes, 16 * size, 5'000), small_gather = gather(size, bytes, small, 5'000),
-               middling_gather = gather(size, bytes, middling, 2'000), large_gather = gather(size, bytes, large, 200);
+  const double tiny_gather = gather(size, bytes, 16 * size, 5'000),
+               small_gather = gather(size, bytes, small, 5'000),
+               middling_gather = gather(size, bytes, middling, 2'000),
+               large_gather = gather(size, bytes, large, 200);
   double posting = 0;
   if (size > 1) {
     constexpr int times = 200;
     std::vector<MPI_Request> requests(2 * times);
     const int other = rank ^ 1;
-    posting = seconds(1, [&](int) {
-      for (int k = 0; k < times; ++k) {
-        MPI_Irecv(bytes.data() + 8 * k, 8, MPI_BYTE, other, 0, MPI_COMM_WORLD, &requests[2 * k]);
-        MPI_Isend(bytes.data() + large, 8, MPI_BYTE, other, 0, MPI_COMM_WORLD, &requests[2 * k + 1]);
-      }
-      MPI_Waitall(2 * times, requests.data(), MPI_STATUSES_IGNORE);
-    }) / times;
+    posting =
+        seconds(1,
+                [&](int) {
+                  for (int k = 0; k < times; ++k) {
+                    MPI_Irecv(bytes.data() + 8 * k, 8, MPI_BYTE, other, 0, MPI_COMM_WORLD, &requests[2 * k]);
+                    MPI_Isend(bytes.data() + large, 8, MPI_BYTE, other, 0, MPI_COMM_WORLD,
+                              &requests[2 * k + 1]);
+                  }
+                  MPI_Waitall(2 * times, requests.data(), MPI_STATUSES_IGNORE);
+                }) /
+        times;
   }
   MPI_Barrier(MPI_COMM_WORLD);
   if (rank == 0)
-    std::printf("{\"latency\": %.3e, \"bandwidth\": %.3e, \"posting\": %.3e, \"gather\": {\"%d\": %.3e, \"%d\": %.3e, \"%d\": %.3e, "
-                "\"%d\": %.3e}, \"look\": %.3e, \"tally\": %.3e, \"row\": %.3e}\n",
-                short_way, large / (long_way - short_way), posting, 16 * size, tiny_gather, small, small_gather, middling,
-                middling_gather, large, large_gather, look(), tally(), row());
+    std::printf(
+        "{\"latency\": %.3e, \"bandwidth\": %.3e, \"posting\": %.3e, \"gather\": {\"%d\": %.3e, \"%d\": "
+        "%.3e, \"%d\": %.3e, "
+        "\"%d\": %.3e}, \"look\": %.3e, \"tally\": %.3e, \"row\": %.3e}\n",
+        short_way, large / (long_way - short_way), posting, 16 * size, tiny_gather, small, small_gather,
+        middling, middling_gather, large, large_gather, look(), tally(), row());
   MPI_Finalize();
 }
