@@ -1,6 +1,6 @@
 // For bench/scaling: stands before MPI's library (LD_PRELOAD) and counts what a rank sends: on MPI_Finalize
 // one line a rank on stderr,
-//   counted RANK TAG messages bytes ... gathers N bytes B seconds S
+//   counted RANK, messages and bytes of each tag, gathers NUMBER BYTES SECONDS
 // The tags are those of src/ranks/ranks.hpp, in their order.
 #include <mpi.h>
 #include <stdio.h>
