@@ -158,10 +158,10 @@ def gather(ranks, size, machine):
                 nodes=rounds + rounds_near * machine.near_latency + wire + copies)  # one rank of a node sends, and deals out
 
 
-def step(bed, ranks, m, machine, record_every=math.inf, group=1, looks=True, way=None, shared=None):
+def step(bed, ranks, m, machine, record_every=math.inf, group=1, way=None, shared=None):
     """Parts of a step's time, s, on the rank that is last.
 
-    group: chunks added up before the gather. looks: a rank looks for its grains among the cells of every earlier rank, as it does.
+    group: chunks added up before the gather.
     way: of the gather; None: the better of ring and doubling, of which an MPI chooses. shared: of traffic(), where known.
     """
     chunks = chunk_count(bed.grains)
@@ -185,7 +185,7 @@ def step(bed, ranks, m, machine, record_every=math.inf, group=1, looks=True, way
     if group > 1 and chunks / ranks < group:  # a group's ranks tell their first of their chunks
         out["totals"] += math.ceil(math.log2(group * ranks / chunks + 1)) * (machine.latency if far else machine.near_latency)
     out["sums"] = -(-chunks // group) * m.tally if ranks > 1 else 0.0
-    out["search"] = search(bed, ranks, m, machine, looks) / m.steps_of_search
+    out["search"] = search(bed, ranks, m, machine) / m.steps_of_search
     out["records"] = bed.grains * m.state_bytes * (1 / machine.bandwidth + 3 / machine.copying) / record_every if ranks > 1 else 0.0
     return out
 
@@ -207,15 +207,14 @@ def cells(bed):
     return along(width)
 
 
-def search(bed, ranks, m, machine, looks=True):
-    """What a search takes beyond that of one rank: cells to all, a look for each grain at each earlier rank, and parcels."""
+def search(bed, ranks, m, machine):
+    """What a search takes beyond that of one rank: cells to all, ranks that have none beside those of this one ruled out by their
+    bits, a look for each grain at some 26 others, and parcels."""
     if ranks == 1:
         return 0.0
     bits = 8 * -(-cells(bed) // 64)
     ways = gather(ranks, bits * ranks, machine)
-    # Where ranks are ruled out by their bits before, each costs a pass over the bits, and some 26 of them looks.
-    look = (ranks - 1) * bed.grains / ranks * m.look
-    if not looks:
-        look = (ranks - 1) * bits / 8 * 0.5e-9 + min(ranks - 1, 26) * bed.grains / ranks * m.look
+    near = min(ranks - 1, 26)
+    look = (ranks - 1) * bits / 8 * 0.5e-9 + near * bed.grains / ranks * m.look
     latency = machine.latency if machine.nodes(ranks) > 1 else machine.near_latency
-    return min(ways["ring"], ways["doubling"]) + look + (ranks - 1) * 2 * 2 * (latency / 2 + machine.posting)
+    return min(ways["ring"], ways["doubling"]) + look + near * 2 * 2 * (latency / 2 + machine.posting)

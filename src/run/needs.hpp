@@ -6,13 +6,15 @@
 //   cell    of the pore water's grid, coupling::bytes_a_cell
 #pragma once
 #include "case/case.hpp"
+#include "ranks/ranks.hpp"
 
 namespace moraine::run {
 
 double bytes_needed(double grains, bool wet, double cells = 0);
 
 // Throws Error with what is needed, what is there, and how many grains would fit; of a case that draws its
-// grains itself. `at_once` such cases run at the same time.
-void expect_room(const cases::Case& c, int at_once = 1);
+// grains itself. `at_once` such cases run at the same time. ranks: that share the bed, of which the first
+// holds all grains while it makes a stage ready and writes; null: there are no others.
+void expect_room(const cases::Case& c, int at_once = 1, const Ranks* ranks = nullptr);
 
 }  // namespace moraine::run

@@ -18,6 +18,7 @@
 #include "output/files.hpp"
 #include "output/sealed.hpp"
 #include "run/guard.hpp"
+#include "run/needs.hpp"
 #include "run/precheck.hpp"
 #include "run/press.hpp"
 #include "run/progress.hpp"
@@ -77,6 +78,7 @@ class Runner {
       : options_(options), case_(c), files_{case_.directory / "output"} {}
 
   Result run() {
+    if (options_.ranks) expect_room(case_, 1, options_.ranks);
     start_ = start_of(case_);  // with the engine, before anything of an earlier run is touched
     engine_ = make_engine();
     warnings_ = precheck(case_, start_, *engine_);

@@ -25,7 +25,7 @@ def test_commands():
 
 
 @pytest.mark.parametrize("command, options", [
-    ("run", "--resume --force --quiet --set --backend --threads --help"),
+    ("run", "--resume --force --quiet --set --backend --threads --ranks --help"),
     ("export", "--format --output --help"),
     ("watch", "--interval --once --time --png --no-png --help"),
     ("figures", "--output --format --only --help"),

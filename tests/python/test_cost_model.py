@@ -72,8 +72,9 @@ def test_one_rank_pays_nothing_for_others():
     assert set(parts.values()) == {0.0}
 
 
-def test_looking_at_every_rank_costs_what_it_says():
-    bed = model.Bed((1, 1, 2), 10_000, 0.1)
-    more = model.search(bed, 100, measured, near) - model.search(bed, 100, measured, near, looks=False)
-    bits = 8 * -(-model.cells(bed) // 64)
-    assert more == pytest.approx((99 - 26) * 100 * 1e-7 - 99 * bits / 8 * 0.5e-9)
+def test_a_rank_looks_among_the_cells_of_its_neighbours_only():
+    few, many = (model.search(model.Bed((1, 1, 2), 100 * ranks, 0.1), ranks, measured, near) for ranks in (70, 100))
+    bits = [8 * -(-model.cells(model.Bed((1, 1, 2), 100 * ranks, 0.1)) // 64) for ranks in (70, 100)]
+    assert bits[0] == bits[1]
+    gathered = [min(w["ring"], w["doubling"]) for w in (model.gather(r, b * r, near) for r, b in zip((70, 100), bits))]
+    assert many - few == pytest.approx(gathered[1] - gathered[0] + (99 - 69) * bits[0] / 8 * 0.5e-9)

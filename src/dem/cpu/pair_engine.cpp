@@ -8,6 +8,9 @@
 //   search_margin.hpp, thread_count.hpp  what follows the clock, and changes no bit
 #include "dem/cpu/pair_engine.hpp"
 
+#include <sched.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <chrono>
 
@@ -19,9 +22,25 @@ namespace moraine::dem::cpu {
 
 namespace {
 
+// Ranks that may use just the cores that this one may.
+int sharing_cores(Ranks& ranks) {
+  struct Cores {
+    char host[64] = {};
+    cpu_set_t set;
+  } own;
+  gethostname(own.host, sizeof own.host - 1);
+  CPU_ZERO(&own.set);
+  sched_getaffinity(0, sizeof own.set, &own.set);
+  int same = 0;
+  for (const Cores& c : of_all(ranks, own))
+    same += std::ranges::equal(c.host, own.host) && CPU_EQUAL(&c.set, &own.set);
+  return same;
+}
+
+// All ranks together.
 int default_threads(const Part& part, Index grains) {
   // Below some 1,500 grains a thread waits longer at barriers than it works.
-  const int beside = part.ranks ? part.ranks->on_this_host() : 1;
+  const int beside = part.ranks ? sharing_cores(*part.ranks) : 1;
   return std::clamp(grains / 1500, 1, std::max(1, available_cores() / beside));
 }
 

@@ -75,7 +75,11 @@ class RankedEngine final : public Engine {
                   " chunks of ", chunk_size(state.size()),
                   ", and each rank takes one at least; start it on at most ", chunks,
                   chunks == 1 ? " rank" : " ranks");
-    scene_ = scene, fluid_ = fluid;
+    // Their places are one message (cpu/water_exchange.cpp).
+    if (const Index most = 44'000'000; uses_of(scene).water && state.size() / ranks_.size() > most)
+      throw error("too many grains with pore water for ", ranks_.size(), " ranks: ", state.size(),
+                  "; expected at most ", most, " on each; use more ranks");
+    scene_ = scene, fluid_ = fluid, tried_at_ = 0;
     together([&] { load_parts(state); });
     if (state.staggered || !uses_of(scene).damping()) return;
     State begun = this->state();
@@ -180,7 +184,9 @@ class RankedEngine final : public Engine {
     if (uneven < 1.1 || uneven < 1.05 * tried_at_) return;
     tried_at_ = uneven;
     const State now = state();
-    if (deal_chunks(now, ranks_.size(), water_work()) != first_chunks_) together([&] { load_parts(now); });
+    if (deal_chunks(now, ranks_.size(), water_work()) == first_chunks_) return;
+    together([&] { load_parts(now); });
+    tried_at_ = 0;
   }
 
   Ranks& ranks_;
