@@ -66,6 +66,29 @@ TEST(Ranks, ManySearches) {
   }
 }
 
+// Contacts that the state does not know of yet make one rank's part heavier; it then gives chunks away.
+TEST(Ranks, DealChunksAnew) {
+  const double r = 0.01;
+  std::vector<Vec3d> x;
+  for (int k = 0; k < 256; ++k)  // close together, then far apart
+    x.push_back({1.98 * r * (k % 8 + 1), 1.98 * r * (k / 8 % 8 + 1), 1.98 * r * (k / 64 + 1)});
+  for (int k = 0; k < 384; ++k)
+    x.push_back({4 * r * (k % 8 + 0.5), 4 * r * (k / 8 % 8 + 0.5), 4 * r * (k / 64 + 4)});
+  Bed bed{{}, grains_at_rest(std::vector<double>(x.size(), r), x)};
+  bed.scene.box = {32 * r, 32 * r, 60 * r};
+  bed.scene.periodic_z = true, bed.scene.body(BodyId::floor) = {}, bed.scene.gravity = 0;
+  bed.scene.contact.fill(LinearContact{1e5, 1e5, 0, 0, 0.5, 0.5});
+  bed.scene.dt = 0.1 * std::sqrt(mass(bed.scene, r) / 1e5);
+  EngineOnRanks two(2, 1);
+  two->load(bed.scene, bed.state);
+  const double before = two->counts().most_work;
+  EXPECT_GT(before, 1.3);
+  two->advance(20);
+  EXPECT_LT(two->counts().most_work, 0.5 + 0.5 * before);
+  two->advance(20);
+  expect_same_bits(two->state(), run(*make_engine(Backend::cpu, 1), bed.scene, bed.state, 40));
+}
+
 TEST(Ranks, TooFewGrains) {
   const Bed& bed = settled_bed();
   EngineOnRanks many(chunk_count(bed.state.size()) + 1, 1);
