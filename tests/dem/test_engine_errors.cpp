@@ -3,6 +3,7 @@
 #include "dem/sums.hpp"
 #include "error.hpp"
 #include "physics/scenes.hpp"
+#include "thread_ranks.hpp"
 
 namespace moraine::dem {
 namespace {
@@ -115,6 +116,30 @@ TEST(SurroundingsThatFail, EndARunByTheirError) {
           failing = Failing(1000, false);
           EXPECT_NO_THROW(run());
         }
+}
+
+// On several ranks rank 0 has it.
+TEST(SurroundingsThatFail, EndARunOnRanksByTheirError) {
+  Bed bed = cloud(Failing::grains, 0.26, 3);
+  bed.scene.exchange_interval = 1;
+  for (const int threads : {1, 2})
+    for (const bool in_remap : {false, true})
+      for (const int at : {1, 2, 7, 40}) {
+        EngineOnRanks engine(3, threads);
+        Failing failing(at, in_remap);
+        const auto run = [&] {
+          engine->load(bed.scene, bed.state, &failing);
+          engine->advance(40);
+        };
+        try {
+          run();
+          ADD_FAILURE() << threads << " threads, exchange " << at;
+        } catch (const Error& e) {
+          EXPECT_STREQ(e.what(), in_remap ? "no remap" : "no solution");
+        }
+        failing = Failing(1000, false);
+        EXPECT_NO_THROW(run());
+      }
 }
 
 TEST_P(EngineErrors, NameTheLostGrainAndTheStep) {

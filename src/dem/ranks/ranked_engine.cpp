@@ -143,7 +143,7 @@ class RankedEngine final : public Engine {
 
   void load_parts(const State& state) {
     all_ = state.size();
-    first_chunks_ = deal_chunks(state, ranks_.size(), water_work());
+    first_chunks_ = deal_chunks(state, ranks_.size());
     const cpu::Part whole = cpu::Part::whole(scene_, state);
     const Loading loading{
         scene_, motion_of(scene_, state), whole.r_max, whole.margin, whole.widest_margin, all_, threads_};
@@ -163,16 +163,9 @@ class RankedEngine final : public Engine {
     loaded_ = true;
   }
 
-  // Of rank 0 with the pore water, in pairs a step: an exchange takes as long as two pairs for each grain
-  // (docs/decisions.md).
-  double water_work() const {
-    return uses_of(scene_).water ? 2.0 * all_ / static_cast<double>(scene_.exchange_interval) : 0;
-  }
-
   // The largest work of a rank over the mean.
   double unevenness() const {
-    std::vector<double> work = part_.engine().work();
-    work[0] += water_work();
+    const std::vector<double>& work = part_.engine().work();
     double all = 0;
     for (const double w : work) all += w;
     return *std::ranges::max_element(work) * ranks_.size() / all;
@@ -184,7 +177,7 @@ class RankedEngine final : public Engine {
     if (uneven < 1.1 || uneven < 1.05 * tried_at_) return;
     tried_at_ = uneven;
     const State now = state();
-    if (deal_chunks(now, ranks_.size(), water_work()) == first_chunks_) return;
+    if (deal_chunks(now, ranks_.size()) == first_chunks_) return;
     together([&] { load_parts(now); });
     tried_at_ = 0;
   }

@@ -33,11 +33,11 @@ void get_common(Parcel& parcel, State& s) {
 
 }  // namespace
 
-std::vector<Index> deal_chunks(const State& s, int ranks, double more_of_first) {
+std::vector<Index> deal_chunks(const State& s, int ranks) {
   const Index size = chunk_size(s.size()), chunks = chunk_count(s.size());
   std::vector<double> work(chunks, 0.3 * size);
   for (const Contact& c : s.contacts) ++work[c.i / size];
-  double all = more_of_first, before = more_of_first;
+  double all = 0, before = 0;
   for (const double w : work) all += w;
   std::vector<Index> first{0};
   for (Index c = 0; c < chunks && static_cast<int>(first.size()) < ranks; before += work[c++]) {

@@ -6,8 +6,7 @@
 namespace moraine::dem {
 
 // The first chunk of each rank, and one after the last: about as much work for each, by contacts and grains.
-// more_of_first: what the first rank has to do besides, in contacts.
-std::vector<Index> deal_chunks(const State& state, int ranks, double more_of_first = 0);
+std::vector<Index> deal_chunks(const State& state, int ranks);
 
 // A rank's grains [first, end) with the contacts that are theirs, numbers from the first on, and behind the
 // materials of those grains the ones of ghosts (Bed::load_state).
