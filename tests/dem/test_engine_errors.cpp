@@ -93,53 +93,45 @@ struct Failing : FluidCoupling {
   }
 };
 
-// Also where several threads are under way; and an engine is good for another run afterwards.
-TEST(SurroundingsThatFail, EndARunByTheirError) {
+// At any exchange; and an engine is good for another run afterwards. make(): what points to one.
+template <class Make>
+void expect_its_error(Make&& make) {
   Bed bed = cloud(Failing::grains, 0.26, 3);
   bed.scene.exchange_interval = 1;
+  for (const bool in_remap : {false, true})
+    for (const int at : {1, 2, 7, 40}) {
+      Failing failing(at, in_remap);
+      const auto engine = make();
+      const auto run = [&] {
+        (*engine).load(bed.scene, bed.state, &failing);
+        (*engine).advance(40);
+      };
+      try {
+        run();
+        ADD_FAILURE() << "exchange " << at;
+      } catch (const Error& e) {
+        EXPECT_STREQ(e.what(), in_remap ? "no remap" : "no solution");
+      }
+      failing = Failing(1000, false);
+      EXPECT_NO_THROW(run());
+    }
+}
+
+// Also where several threads are under way.
+TEST(SurroundingsThatFail, EndARunByTheirError) {
   for (const Backend backend : both_engines())
-    for (const int threads : {1, 2, 4})
-      for (const bool in_remap : {false, true})
-        for (const int at : {1, 2, 7, 40}) {
-          Failing failing(at, in_remap);
-          const auto engine = make_engine(backend, threads);
-          const auto run = [&] {
-            engine->load(bed.scene, bed.state, &failing);
-            engine->advance(40);
-          };
-          try {
-            run();
-            ADD_FAILURE() << threads << " threads, exchange " << at;
-          } catch (const Error& e) {
-            EXPECT_STREQ(e.what(), in_remap ? "no remap" : "no solution");
-          }
-          failing = Failing(1000, false);
-          EXPECT_NO_THROW(run());
-        }
+    for (const int threads : {1, 2, 4}) {
+      SCOPED_TRACE(threads);
+      expect_its_error([&] { return make_engine(backend, threads); });
+    }
 }
 
 // On several ranks rank 0 has it.
 TEST(SurroundingsThatFail, EndARunOnRanksByTheirError) {
-  Bed bed = cloud(Failing::grains, 0.26, 3);
-  bed.scene.exchange_interval = 1;
-  for (const int threads : {1, 2})
-    for (const bool in_remap : {false, true})
-      for (const int at : {1, 2, 7, 40}) {
-        EngineOnRanks engine(3, threads);
-        Failing failing(at, in_remap);
-        const auto run = [&] {
-          engine->load(bed.scene, bed.state, &failing);
-          engine->advance(40);
-        };
-        try {
-          run();
-          ADD_FAILURE() << threads << " threads, exchange " << at;
-        } catch (const Error& e) {
-          EXPECT_STREQ(e.what(), in_remap ? "no remap" : "no solution");
-        }
-        failing = Failing(1000, false);
-        EXPECT_NO_THROW(run());
-      }
+  for (const int threads : {1, 2}) {
+    SCOPED_TRACE(threads);
+    expect_its_error([&] { return EngineOnRanks(3, threads); });
+  }
 }
 
 TEST_P(EngineErrors, NameTheLostGrainAndTheStep) {
