@@ -1,10 +1,23 @@
-"""Reads, measures and draws the results of Moraine. `moraine.open(CASE)` is where to begin; see `moraine.case`."""
-__all__ = ["Case", "MissingData", "Snapshot", "Stage", "Table", "open"]
+"""Grain-scale till mechanics: builds, runs, measures and draws cases of Moraine.
+
+`moraine.Case` is where to begin, `moraine.open(DIRECTORY)` opens results that are there.
+"""
+import importlib
+
 __version__ = "0.1.0"
 
+_home = {  # module of each public name; on demand, as some need no NumPy, and only some the compiled part
+    "Results": "results", "MissingData": "sealed", "Snapshot": "results", "Stage": "results", "Table": "results", "open": "results",
+    "Run": "run", "Error": "run",
+}
+__all__ = list(_home)
 
-def __getattr__(name):  # on demand: the workflow's own Python may lack numpy and h5py
-    if name not in __all__:
+
+def __getattr__(name):
+    if name not in _home:
         raise AttributeError(f"module {__name__} has no {name}")
-    from . import case
-    return getattr(case, name)
+    return getattr(importlib.import_module(f".{_home[name]}", __name__), name)
+
+
+def __dir__():
+    return sorted([*globals(), *__all__])

@@ -4,7 +4,7 @@ import difflib
 import importlib
 import sys
 
-from .case import MissingData
+from .results import MissingData
 
 commands = {  # name: (module, what it does)
     "watch": ("watch", "follow a running case: friction, dilation and energy as they grow"),

@@ -6,7 +6,7 @@ from itertools import groupby
 import numpy as np
 
 from . import compaction, measure, paper, profile, rotation, shearing, strength
-from .case import MissingData
+from .results import MissingData
 from .style import column, ink, lines, page, panel, plt
 
 kPa = 1e3

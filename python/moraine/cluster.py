@@ -3,7 +3,7 @@ from pathlib import Path
 import re
 import shutil
 
-from .case import MissingData
+from .results import MissingData
 
 root = Path(__file__).resolve().parents[2]
 kept = root / "cases/cluster"   # profiles

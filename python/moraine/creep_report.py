@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from . import measure, style
-from .case import Case, MissingData
+from .results import Results, MissingData
 from .page import LeftOut, Page, beside, machine, version
 from .progress import duration
 from .style import panel, plt
@@ -113,7 +113,7 @@ def load(study, note):
     runs = []
     for file in sorted(Path(study).glob("seed-*/**/output/case.toml")):
         try:
-            case = Case(file.parents[1])
+            case = Results(file.parents[1])
             if not any(s.kind == "shear_stress" for s in case.stages):
                 continue  # a bed
             run = Run(case)

@@ -4,7 +4,7 @@
 import numpy as np
 
 from . import strength, style
-from .case import MissingData
+from .results import MissingData
 from .intervals import mean_interval, show
 from .style import ink, lines, panel, plt
 

@@ -6,7 +6,7 @@ from typing import Callable
 import sys
 
 from . import bed_figures, force_figures, measure, shearing, style, water_figures
-from .case import Case, MissingData
+from .results import Results, MissingData
 
 
 class Selection:
@@ -132,12 +132,12 @@ def find(directories):
     cases = []
     for directory in map(Path, directories):
         if (directory / "output" / "case.toml").exists():
-            cases.append(Case(directory))
+            cases.append(Results(directory))
             continue
         below = sorted(p.parents[1] for p in directory.rglob("output/case.toml"))
         if not below:
-            cases.append(Case(directory))  # says what is wrong with it
-        cases += map(Case, below)
+            cases.append(Results(directory))  # says what is wrong with it
+        cases += map(Results, below)
     return cases
 
 

@@ -1,6 +1,6 @@
 """Figures of forces and of moving grains: Figs. 5, 6, 7 and 10 of the paper, force distributions, and a sheared bed.
 
-Each function returns a matplotlib Figure. Snapshots are those of moraine.case; stresses in Pa.
+Each function returns a matplotlib Figure. Snapshots are those of moraine.results; stresses in Pa.
 """
 import numpy as np
 from matplotlib.collections import LineCollection, PatchCollection
@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from . import forces, shearing, spheres
 from . import section as sections
-from .case import MissingData
+from .results import MissingData
 from .style import column, ink, lines, page, panel, plt, sequential
 
 fixed_grey = (0.72, 0.72, 0.72, 1)

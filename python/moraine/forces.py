@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .case import MissingData
+from .results import MissingData
 
 
 def free_contacts(snapshot):

@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection
 from scipy import stats
 
 from . import compaction, dilatancy, forces, measure, profile, shearing, strength
-from .case import Case, MissingData
+from .results import Results, MissingData
 from .intervals import mean_interval, show
 from .page import LeftOut, Page, machine, version
 from .progress import duration
@@ -174,7 +174,7 @@ def load(study, note):
     runs = []
     for file in sorted(Path(study).glob("seed-*/shear-*/sweep/*/output/case.toml")):
         try:
-            run = Run(Case(file.parents[1]))
+            run = Run(Results(file.parents[1]))
             if run.done < 0.999:
                 raise MissingData(f"has come to {100 * run.done:.0f} % of its shear")
             runs.append(run)

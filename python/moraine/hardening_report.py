@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from . import measure, shearing, style, water_figures
-from .case import Case, MissingData
+from .results import Results, MissingData
 from .intervals import compare, further_run, mean_interval, show
 from .page import LeftOut, Page, beside, machine, version
 from .progress import duration
@@ -107,7 +107,7 @@ def load(study, note):
     for file in sorted(Path(study).glob("seed-*/**/output/case.toml")):
         case = None
         try:
-            case = Case(file.parents[1])
+            case = Results(file.parents[1])
             if not any(s.kind == "shear" for s in case.stages):
                 continue  # a bed
             run = Run(case)

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from . import dilatancy, measure, shearing, study_runs
-from .case import MissingData
+from .results import MissingData
 from .intervals import mean_interval, show
 from .page import LeftOut, Page, machine, version
 from .style import lines, page as page_width, panel, plt

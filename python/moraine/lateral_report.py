@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from . import dilatancy, measure, profile, shearing, strength, study_runs
-from .case import MissingData, Table
+from .results import MissingData, Table
 from .intervals import mean_interval, show
 from .page import LeftOut, Page, machine, version
 from .style import lines, page as page_width, panel, plt, sequential

@@ -6,7 +6,7 @@ import io
 import numpy as np
 
 from . import compaction, forces, profile, rotation, section, shearing, strength
-from .case import Case, MissingData
+from .results import Results, MissingData
 from .progress import duration
 
 
@@ -15,7 +15,7 @@ def runs(directory, say=print):
     found = []
     for file in sorted(Path(directory).glob("seed-*/shear/sweep/*/output/case.toml")):
         try:
-            case = Case(file.parents[1])
+            case = Results(file.parents[1])
             case.seed, case.normal_stress  # what they are sorted by
             found.append(case)
         except MissingData as why:

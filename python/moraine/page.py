@@ -7,7 +7,7 @@ import platform
 import subprocess
 
 from . import style
-from .case import MissingData
+from .results import MissingData
 
 
 class Page:

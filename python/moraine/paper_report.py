@@ -11,7 +11,7 @@ import numpy as np
 from scipy import special, stats
 
 from . import figures, measure, paper, shearing
-from .case import MissingData
+from .results import MissingData
 from .intervals import compare, further_run, mean_interval, show
 from .page import Page, machine, version
 

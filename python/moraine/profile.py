@@ -1,7 +1,7 @@
 """What varies with height: displacement, the shear zone, porosity (pars. 32 and 33, Figs. 8 and 9)."""
 import numpy as np
 
-from .case import MissingData
+from .results import MissingData
 
 
 def slabs(top, thickness):

@@ -5,8 +5,8 @@ import time
 
 import numpy as np
 
-from . import case as cases, sealed, shearing
-from .case import MissingData
+from . import results as cases, sealed, shearing
+from .results import MissingData
 
 window = 300  # s of the clock over which the pace of a run is measured
 

@@ -2,7 +2,7 @@
 from pathlib import Path
 import importlib
 
-from .case import MissingData
+from .results import MissingData
 from .study import read
 
 reports = ("paper", "hardening", "creep", "grading", "angular", "lateral", "hysteresis")   # NAME: build(study, output, notes) of NAME_report.py

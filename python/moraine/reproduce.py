@@ -8,7 +8,7 @@ import signal
 import subprocess
 
 from . import cluster
-from .case import MissingData
+from .results import MissingData
 from .study import Study, read
 
 root = Path(__file__).resolve().parents[2]

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .case import MissingData, Snapshot, Table
+from .results import MissingData, Snapshot, Table
 
 signed = ("shear_strain", "shear_stress", "shear_friction", "total_friction")  # columns of the series that change sign with x
 

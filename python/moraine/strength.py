@@ -13,7 +13,7 @@ import numpy as np
 from scipy import optimize, stats
 
 from . import paper, shearing
-from .case import MissingData
+from .results import MissingData
 
 window = 0.02       # of shear strain, over which the smoothed peak is a mean
 late = 2 / 3        # of the strain at the end: where the ultimate state begins

@@ -37,7 +37,7 @@ import re
 import sys
 import tomllib
 
-from .case import MissingData
+from .results import MissingData
 
 of_beds = ("grains.", "box.")   # keys that concern a bed wherever they are set
 

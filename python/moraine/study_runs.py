@@ -2,7 +2,7 @@
 from pathlib import Path
 
 from . import shearing
-from .case import Case, MissingData
+from .results import Results, MissingData
 from .progress import duration
 
 
@@ -38,7 +38,7 @@ def load(study, make, note):
     runs = []
     for file in sorted(Path(study).glob("seed-*/**/output/case.toml")):
         try:
-            case = Case(file.parents[1])
+            case = Results(file.parents[1])
             if not any(s.sheared for s in case.stages):
                 continue  # a bed
             run = make(case)

@@ -10,7 +10,7 @@ import textwrap
 import time
 
 from . import shearing
-from .case import MissingData
+from .results import MissingData
 from .progress import Progress, readable
 from .textplot import plot
 

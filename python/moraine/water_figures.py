@@ -5,7 +5,7 @@ water together press on the top wall; in a dry bed that is the shear friction.""
 import numpy as np
 
 from . import shearing, strength
-from .case import MissingData
+from .results import MissingData
 from .style import lines, page, panel, plt
 
 width = 0.01    # of shear strain, over which curves are smoothed

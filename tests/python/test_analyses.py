@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from moraine import compaction, profile, rotation, strength
-from moraine.case import MissingData, Table
+from moraine.results import MissingData, Table
 
 rng = np.random.default_rng(1)
 

@@ -7,7 +7,7 @@ import pytest
 from conftest import root
 from moraine import cluster
 from moraine.__main__ import main
-from moraine.case import MissingData
+from moraine.results import MissingData
 from moraine.study import Study
 
 slurm = root / "cases/cluster/slurm"

@@ -5,7 +5,7 @@ import pytest
 from fake_case import FakeCase, stage
 from moraine import creep_report as report
 from moraine.__main__ import main
-from moraine.case import Case, MissingData
+from moraine.results import Results, MissingData
 from moraine.creep_report import Record
 
 period = 5.0
@@ -25,7 +25,7 @@ def fake(directory, seconds=15.0, **what):
     rows["coordination"] = coordination(rows["stage_time"], **what)
     rows["shear_strain"] = 0.1 * rows["stage_time"]
     case.write(rows[rows["stage_time"] <= seconds + 1e-9])
-    return Case(directory)
+    return Results(directory)
 
 
 def record(seconds=15.0, **what):

@@ -5,7 +5,7 @@ import pytest
 
 from fake_case import FakeCase
 from fake_snapshot import write
-from moraine import Case, MissingData
+from moraine import Results, MissingData
 from moraine.__main__ import main
 
 
@@ -49,7 +49,7 @@ def test_a_damaged_case_is_named(tmp_path, text):
     case = FakeCase(tmp_path / "case")
     (case.output / "case.toml").write_bytes(text)
     with pytest.raises(MissingData, match="case.toml: not what a run of Moraine writes"):
-        Case(case.directory)
+        Results(case.directory)
 
 
 def test_where_nothing_can_be_written_is_told(tmp_path, capsys):

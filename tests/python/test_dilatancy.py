@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from moraine import dilatancy, profile, strength
-from moraine.case import MissingData, Table
+from moraine.results import MissingData, Table
 
 
 def stage(excess=0.0, end=0.5):

@@ -8,7 +8,7 @@ import fake_wet_case
 from fake_wet_case import height
 from moraine import hardening_report as report
 from moraine.__main__ import main
-from moraine.case import Case
+from moraine.results import Results
 from moraine.hardening_report import Kind
 
 rate_1 = {"viscosity": 1.797e-6, "k_c": 3.5e-15}
@@ -16,7 +16,7 @@ rate_1 = {"viscosity": 1.797e-6, "k_c": 3.5e-15}
 
 def fake(directory, **what):
     fake_wet_case.write(directory, **what)
-    return Case(directory)
+    return Results(directory)
 
 
 def test_a_run_is_measured(tmp_path):

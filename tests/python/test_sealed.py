@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fake_case import FakeCase
-from moraine import Case, MissingData, sealed
+from moraine import Results, MissingData, sealed
 from moraine.__main__ import main
-from moraine.case import Snapshot
+from moraine.results import Snapshot
 
 
 def damages(data, count, seed=2013):
@@ -68,7 +68,7 @@ def test_a_series_full_of_garbage_ends_in_seconds(tmp_path, monkeypatch):
         case.file.write_bytes(whole[:start] + random.Random(start).randbytes(len(whole) - start))
         began = time.monotonic()
         with pytest.raises(MissingData, match=str(case.file)):
-            Case(case.directory).series
+            Results(case.directory).series
         assert time.monotonic() < began + 3
 
 

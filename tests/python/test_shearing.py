@@ -11,7 +11,7 @@ from fake_sheared_case import place, shear, to_and_fro, twins, write
 from moraine import bed_figures, figures, force_figures, hardening_report, measure, paper_report as report, profile, shearing, strength, style, water_figures
 from moraine import open as open_case
 from moraine.__main__ import main
-from moraine.case import MissingData
+from moraine.results import MissingData
 from moraine.progress import Progress
 
 

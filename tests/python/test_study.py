@@ -10,7 +10,7 @@ from conftest import root
 from fake_case import FakeCase
 from moraine import measure, paper_report as report, reproduce
 from moraine.__main__ import main
-from moraine.case import Case, MissingData
+from moraine.results import Results, MissingData
 from moraine.study import Study as AnyStudy, toml
 from moraine.reproduce import last_value, seeds
 
@@ -321,10 +321,10 @@ def test_a_run_under_way_is_left_out(tmp_path):
     case = FakeCase(tmp_path / "case")
     history = case.history()
     case.write(history)
-    measure.require_end(Case(case.directory))
+    measure.require_end(Results(case.directory))
     case.write(history[:-30])
     with pytest.raises(MissingData, match="the shear has come to 8. % of its time"):
-        measure.require_end(Case(case.directory))
+        measure.require_end(Results(case.directory))
 
 
 def test_what_was_not_measured_is_left_out():

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from moraine import angular_report, hysteresis_report, lateral_report
-from moraine.case import Table
+from moraine.results import Table
 
 
 def slipping_run(velocity, pressure, interval=0.01):

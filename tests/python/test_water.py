@@ -5,13 +5,13 @@ import pytest
 import fake_wet_case
 from moraine import figures, water_figures
 from moraine.__main__ import main
-from moraine.case import Case, MissingData
+from moraine.results import Results, MissingData
 
 
 def fake(directory, **what):
     """See fake_wet_case.py."""
     fake_wet_case.write(directory, **what)
-    return Case(directory)
+    return Results(directory)
 
 
 def test_pressure_by_level_and_time(tmp_path):

@@ -186,7 +186,7 @@ class Stage:
         return self.settings.get("fluid", False)
 
 
-class Case:
+class Results:
     def __init__(self, directory):
         self.directory = Path(directory)
         self.output = self.directory / "output"
@@ -206,7 +206,7 @@ class Case:
             raise MissingData(f"{self.output}/case.toml: not what a run of Moraine writes: {why}") from None
 
     def __repr__(self):
-        return f"Case({str(self.directory)!r}: {', '.join(s.name for s in self.stages)})"
+        return f"Results({str(self.directory)!r}: {', '.join(s.name for s in self.stages)})"
 
     @cached_property
     def series(self):
@@ -251,4 +251,4 @@ class Case:
 
 def open(directory):  # noqa: A001 - as in h5py, numpy and PIL
     """The results in a case directory. Raises MissingData where there are none."""
-    return Case(directory)
+    return Results(directory)
