@@ -443,6 +443,12 @@ string word_of(const Key& key) {
 
 string or_word(const Key& key) { return word_of(key).empty() ? "" : ", or " + quoted(word_of(key)); }
 
+string not_of_kind(const Key& key, const string& kind) {
+  const auto kinds = split(key.kinds, ", ");
+  if (key.kinds.empty() || std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) return "";
+  return "none: it belongs to kind " + key.kinds + ", and this stage is " + kind;
+}
+
 void check_range(const Key& key, const Value& value) {
   if (key.type == Type::choice) {
     const auto choices = split(key.accepts, " | ");

@@ -3,6 +3,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "bindings.hpp"
 #include "case/case.hpp"
 #include "case/keys.hpp"
 #include "error.hpp"
@@ -44,4 +45,5 @@ NB_MODULE(_core, m) {
   nb::exception<Error>(m, "Error");
   m.attr("version") = MORAINE_VERSION;
   m.def("keys", &keys, "The table of the keys of case.toml, a dict for each row.");
+  bind_cases(m);
 }
