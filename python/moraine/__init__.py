@@ -8,7 +8,7 @@ __version__ = "0.1.0"
 
 _home = {  # module of each public name; on demand, as some need no NumPy, and only some the compiled part
     "Results": "results", "MissingData": "sealed", "Snapshot": "results", "Stage": "results", "Table": "results", "open": "results",
-    "Case": "case", "Sweep": "sweep", "Run": "run", "Error": "core",
+    "Case": "case", "Sweep": "sweep", "Run": "run", "Error": "run",
 }
 __all__ = list(_home)
 

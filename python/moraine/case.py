@@ -21,8 +21,8 @@ import tomlkit
 import tomlkit.exceptions
 import tomlkit.items
 
-from .core import Error, UnknownKey, _core, spelled_for_python
-from .tables import CaseKeys, KeyTable, by_name, carries_on, classes, keys_of, listed, stage_classes, tables
+from .run import Error, Run, _core
+from .tables import CaseKeys, KeyTable, UnknownKey, by_name, carries_on, classes, keys_of, listed, stage_classes, tables
 
 _written: dict[Path, str] = {}  # what this session has written, so that it may be replaced
 
@@ -164,8 +164,7 @@ class Case(CaseKeys):
         if kind is None:
             kind = self._kind_of(name) if name.startswith("stage.") else ""
         try:
-            with spelled_for_python():
-                return _core.check_value(name, toml, kind)
+            return _core.check_value(name, toml, kind)
         except Error as e:
             if why:
                 return str(e).replace(f"{name} = {toml}", name, 1)
@@ -329,7 +328,6 @@ class Case(CaseKeys):
         resume: go on from the last checkpoint; force: replace the results of an earlier run; threads: 0 for all cores;
         backend: cpu, cuda or auto. Raises moraine.Error.
         """
-        from .run import Run
         self.write()
         return Run(str(self._directory), threads=threads, resume=resume, force=force, backend=backend)
 

@@ -6,8 +6,8 @@ import tomllib
 
 from . import strength
 from .case import toml_item as _item
-from .core import Error, _core, spelled_for_python
 from .results import MissingData, Results
+from .run import Error, _core
 from .tables import by_name, keys, listed
 
 # What the table has of each case, from its last shear stage or else its last stage, and the units.
@@ -124,5 +124,4 @@ def _run(case, sets, progress, *, threads, at_once, resume, force, backend):
         def show(done, line):
             bar.n = 100 * done
             bar.set_postfix_str(line.split("%")[0].rpartition("  ")[0].strip() + line.split("%")[-1])
-        with spelled_for_python():
-            return _core.sweep(str(case.directory), sets, threads, backend, resume, force, at_once, say, show)
+        return _core.sweep(str(case.directory), sets, threads, backend, resume, force, at_once, say, show)

@@ -6,10 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import inspect
 
-from .core import Error, UnknownKey, _core
+from .run import Error, _core
 
 listed = ("material", "pair", "stage")  # tables of which a case may have many
 required = "(required)"
+
+
+class UnknownKey(Error, AttributeError):
+    """A key that case.toml does not know, or that a kind of stage does not have."""
 
 
 @dataclass(frozen=True)

@@ -101,7 +101,7 @@ nb::list sweep(const string& directory, const Sets& sets, int threads, const str
   for (const run::SweptCase& one : cases) {
     nb::dict row;
     row["name"] = one.name, row["directory"] = one.directory.string(), row["values"] = one.values;
-    row["state"] = one.state, row["message"] = one.message;
+    row["state"] = one.state, row["message"] = in_python(one.message);
     rows.append(row);
   }
   return rows;
