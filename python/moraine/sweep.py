@@ -123,5 +123,6 @@ def _run(case, sets, progress, *, threads, at_once, resume, force, backend):
 
         def show(done, line):
             bar.n = 100 * done
-            bar.set_postfix_str(line.split("%")[0].rpartition("  ")[0].strip() + line.split("%")[-1])
+            cases, _, left = line.partition("%")
+            bar.set_postfix_str(cases[:-7].strip() + left.replace("  ETA unknown", ""))  # the bar has the share
         return _core.sweep(str(case.directory), sets, threads, backend, resume, force, at_once, say, show)
