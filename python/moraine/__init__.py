@@ -3,6 +3,14 @@
 `moraine.Case` is where to begin, `moraine.open(DIRECTORY)` opens results that are there.
 """
 import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # for editors; they are loaded on demand
+    from .case import Case
+    from .results import Results, Snapshot, Stage, Table, open
+    from .run import Error, Run
+    from .sealed import MissingData
+    from .sweep import Sweep
 
 __version__ = "0.1.0"
 

@@ -15,14 +15,20 @@ from difflib import get_close_matches
 import os
 from pathlib import Path
 import tomllib
-from typing import Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import tomlkit
 import tomlkit.exceptions
 import tomlkit.items
 
 from .run import Error, Run, _core
-from .tables import CaseKeys, KeyTable, UnknownKey, by_name, carries_on, classes, keys_of, listed, stage_classes, tables
+from .tables import CaseKeys, KeyTable, Material, Pair, Stage, UnknownKey, by_name, carries_on, classes, keys_of, listed, stage_classes, tables
+
+if TYPE_CHECKING:
+    from .results import Results
+    from .sweep import Sweep
+
+Table = TypeVar("Table", bound=KeyTable)
 
 _written: dict[Path, str] = {}  # what this session has written, so that it may be replaced
 
@@ -39,12 +45,12 @@ class Case(CaseKeys):
     Raises moraine.Error where case.toml cannot be read.
     """
 
-    def __init__(self, directory: str | os.PathLike, *, new: bool = False, **keys):
+    def __init__(self, directory: str | os.PathLike, *, new: bool = False, **keys: Any):
         self._directory = Path(directory)
         self._known = self._on_disk()  # the file as it was read or written
         self._made = new or self._known is None  # all of it here, so that it is written in the order of the table of keys
         self._document = tomlkit.document()
-        self._stated = set()  # names of stages that this object was told
+        self._stated: set[str] = set()  # names of stages that this object was told
         self._filled_of = None, None
         if new and self._known != _written.get(self.file):
             self._known = None
@@ -111,7 +117,7 @@ class Case(CaseKeys):
 
     # Keys by their full names.
 
-    def __getitem__(self, name: str):
+    def __getitem__(self, name: str) -> Any:
         """What a key is set to, or else its value by default or preset, in SI: case["contact.k_n"], case["stage.shear.strain"]."""
         table, leaf = self._table_of(name)
         if table is not None and leaf in table:
@@ -125,14 +131,11 @@ class Case(CaseKeys):
         for filled in self._filled_tables(name):
             if leaf in filled:
                 return filled[leaf]
-        if at.startswith("material.") and key.default in by_name:
-            return self[key.default]
-        default = key.default
-        return tomllib.loads(f"v = {default}")["v"] if default[:1] in ('"', "[") else None
+        return tomllib.loads(f"v = {key.default}")["v"] if key.default[:1] in ('"', "[") else None  # None: as another key, see its help
 
-    def __setitem__(self, name: str, value) -> None:
+    def __setitem__(self, name: str, value: Any) -> None:
         """Sets a key: a number in SI, or a text with a unit; a load that changes is a dict, as in case.toml."""
-        if isinstance(value, (Case, _Results())):  # start=bed
+        if hasattr(value, "directory"):  # start=bed, a Case or Results
             value = os.path.relpath(value.directory, self._directory)
         self._judged(name, value)
         before = str(self.text)
@@ -225,6 +228,7 @@ class Case(CaseKeys):
         if table not in self._document:
             self._document.add(table, tomlkit.aot())
         one = tomlkit.table()
+        one.trivia.indent = "\n"
         for leaf, value in keys.items():
             one.add(leaf, toml_item(leaf, value))
         self._document[table].append(one)
@@ -247,25 +251,25 @@ class Case(CaseKeys):
     # Stages, materials, pairs of these.
 
     @property
-    def stages(self) -> "Listed":
+    def stages(self) -> "Listed[Stage]":
         """The stages by name, in the order in which they run: case.stages["shear"].normal_stress = "40 kPa"."""
         return Listed(self, "stage")
 
     @property
-    def materials(self) -> "Listed":
+    def materials(self) -> "Listed[Material]":
         """The materials by name; case.material(...) adds one."""
         return Listed(self, "material")
 
     @property
-    def pairs(self) -> "Listed":
+    def pairs(self) -> "Listed[Pair]":
         """Pairs of materials, by both names: case.pairs["clay-sand"]; case.pair(...) adds one."""
         return Listed(self, "pair")
 
-    def material(self, name: str, **keys) -> "Case":
+    def material(self, name: str, **keys: Any) -> "Case":
         """Adds a material of grains or walls, or states it anew. Returns the case. help(case.materials[name]) lists the keys."""
         return self._state("material", name, {"name": name}, keys)
 
-    def pair(self, first: str, second: str, **keys) -> "Case":
+    def pair(self, first: str, second: str, **keys: Any) -> "Case":
         """What two materials, or one and "wall", have between them. Returns the case. help(case.pairs["FIRST-SECOND"]) lists the keys."""
         return self._state("pair", f"{first}-{second}", {"of": [first, second]}, keys)
 
@@ -322,7 +326,7 @@ class Case(CaseKeys):
         self.write()
         return Text(_core.check_case(str(self._directory), threads=threads, backend=backend).rstrip("\n"))
 
-    def begin(self, *, threads: int = 0, resume: bool = False, force: bool = False, backend: str = "auto"):
+    def begin(self, *, threads: int = 0, resume: bool = False, force: bool = False, backend: str = "auto") -> Run:
         """Begins a run in this process, to be stepped, read and steered: a moraine.Run. Writes the case first.
 
         resume: go on from the last checkpoint; force: replace the results of an earlier run; threads: 0 for all cores;
@@ -331,7 +335,7 @@ class Case(CaseKeys):
         self.write()
         return Run(str(self._directory), threads=threads, resume=resume, force=force, backend=backend)
 
-    def run(self, *, threads: int = 0, resume: bool = False, force: bool = False, backend: str = "auto", progress: bool = True):
+    def run(self, *, threads: int = 0, resume: bool = False, force: bool = False, backend: str = "auto", progress: bool = True) -> "Results":
         """Runs the case to its end in this process, with a progress bar, and returns its moraine.Results. Arguments: as begin().
 
         Ctrl-C (in a notebook: stop) writes a checkpoint; run(resume=True) goes on from there, with the same bits.
@@ -340,13 +344,13 @@ class Case(CaseKeys):
             run.finish(progress=progress)
         return self.results()
 
-    def results(self):
+    def results(self) -> "Results":
         """The moraine.Results of the case, also while it runs; results.refresh() reads what has come since."""
         from .results import Results
         return Results(self._directory)
 
     def sweep(self, values: Mapping[str, Any] | None = None, /, *, threads: int = 0, at_once: int = 0, resume: bool = False,
-              force: bool = False, backend: str = "auto", progress: bool = True, **keys):
+              force: bool = False, backend: str = "auto", progress: bool = True, **keys: Any) -> "Sweep":
         """Runs the case with each of the values, several at once: case.sweep(normal_stress=["10 kPa", "20 kPa"], seed=[1, 2]).
 
         A key of the stages is set in each stage that gives it; {"stage.shear.mu_s": [0.2, 0.4]} sets one in one stage. Several lists
@@ -361,7 +365,7 @@ class Case(CaseKeys):
                      progress=progress)
 
 
-class Listed(Mapping):
+class Listed(Mapping[str, Table], Generic[Table]):
     """The stages of a case (or materials, or pairs of these) by name, in order."""
 
     def __init__(self, case: Case, table: str):
@@ -375,7 +379,7 @@ class Listed(Mapping):
     def __len__(self):
         return len(list(iter(self)))
 
-    def __getitem__(self, name: str) -> KeyTable:
+    def __getitem__(self, name: str) -> Table:
         if name not in list(self):
             raise UnknownKey(f"{self._case.directory}: no {self._table} {name!r}; {self._table}s: {', '.join(self) or 'none'}")
         at = f"{self._table}.{name}"
@@ -399,11 +403,6 @@ class Listed(Mapping):
 
     def _ipython_key_completions_(self):
         return list(self)
-
-
-def _Results():
-    from .results import Results
-    return Results
 
 
 def _name_of(table, one):

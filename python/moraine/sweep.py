@@ -98,14 +98,19 @@ def sweep(case, values, *, progress, **options):
     sets, units, in_si = [], {}, []
     for name, given in values.items():
         given = given.tolist() if hasattr(given, "tolist") else given  # of NumPy
-        many = list(given) if isinstance(given, (list, tuple, range)) else [given]
+        is_list = isinstance(given, (list, tuple, range))
+        many = list(given) if is_list else [given]
         if not many:
             raise Error(f"sweep: {name} = []: expected a value at least")
+        key = _key(name)
+        in_si_here = [_in_si(name, one) for one in many]  # raises where one is wrong
+        if key and key.unit not in ("", "1") and any(isinstance(one, str) for one in many):  # or another's unit would be theirs
+            many = [one if isinstance(one, str) else f"{one!r} {key.unit}" for one in many]
         text = ",".join(_spelled(name, one) for one in many)
-        sets.append((name, text + "," if len(many) == 1 and many is not given and isinstance(given, (list, tuple, range)) else text))
-        if many[0] is not given:
-            units[name] = key.unit or "1" if (key := _key(name)) else "1"
-            in_si.append([_in_si(name, one) for one in many])
+        sets.append((name, text + "," if is_list and len(many) == 1 else text))
+        if is_list:
+            units[name] = key.unit or "1" if key else "1"
+            in_si.append(in_si_here)
     rows = _run(case, sets, progress, **options)
     stopped = [f"\n  {row['name']}: {row['message'] or row['state']}" for row in rows if row["state"] != "finished"]
     if stopped:

@@ -52,7 +52,9 @@ class Key:
         facts = [kind]
         if self.accepts and self.type != "choice":
             facts.append(self.accepts)
-        facts.append("has to be given" if self.default == required else f"default {self.default}")
+        usual, _, special = self.default.partition("; ")
+        usual = "empty" if usual in ('""', "[]") else usual.strip('"')
+        facts.append("has to be given" if self.default == required else f"default {usual}" + (f" ({special})" if special else ""))
         if self.kinds:
             facts.append(f"of stages {self.kinds}")
         return f"{self.meaning}\n\n{'; '.join(facts)}"
@@ -114,10 +116,15 @@ class KeyTable:
         for key in self._keys:
             name = f"{self._at}.{key.leaf}"
             value, own = self._case[name], self._case.has(name)
-            text = "(none)" if value is None else self._case.toml(name, value)
-            lines[own].append(f"{key.leaf} = {text}" + ("" if own or key.unit in ("", "1") else f"  # {key.unit}"))
+            unit = "" if own or key.unit in ("", "1") else f"  # {key.unit}"
+            lines[own].append(f"# {key.leaf}: {key.default}" if value is None else f"{key.leaf} = {self._case.toml(name, value)}{unit}")
         by_default = ["# by default"] if lines[False] else []
         return "\n".join([f"[{self._at}]", *lines[True], *by_default, *lines[False]])
+
+
+class Stage(KeyTable):
+    """A [[stage]]; each kind has a class of its own."""
+    __slots__ = ()
 
 
 def _property(key, name_of):
@@ -137,7 +144,7 @@ def _table_class(table, kind=None):
     members = {"__slots__": (), "__doc__": f"{about} {KeyTable.__doc__}\n\n{rows}", "__module__": __name__, "_keys": own}
     for key in own:
         members[key.leaf] = _property(key, lambda self, leaf=key.leaf: f"{self._at}.{leaf}")
-    return type(class_name(table, kind), (KeyTable,), members)
+    return type(class_name(table, kind), (Stage if kind else KeyTable,), members)
 
 
 classes = {table: _table_class(table) for table in tables if table and table != "stage"}

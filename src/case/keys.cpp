@@ -479,8 +479,13 @@ string suggestion(const string& unknown_key, const string& shown) {
   }
   if (const string near = nearest(unknown, siblings); !near.empty())
     return "did you mean " + (shown.empty() ? table : shown) + near + "?";
-  if (siblings.empty()) {
-    const string near = nearest(unknown_key, others);
+  if (siblings.empty() || table.empty()) {
+    // Of a name that lacks its table, what another table has that is near.
+    string near = nearest(unknown_key, others);
+    std::size_t least = unknown.size();
+    for (const string& other : others)
+      if (table.empty() && !nearest(unknown, {leaf(other)}).empty())
+        if (const auto d = edit_distance(unknown, leaf(other)); d < least) least = d, near = other;
     return near.empty() ? "`moraine keys` lists all" : "did you mean " + near + "?";
   }
   return "known here: " + join(siblings, ", ");
