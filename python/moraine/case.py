@@ -112,6 +112,8 @@ class Case(CaseKeys):
             self[name] = value  # raises
 
     def __getattr__(self, name):  # what is not there
+        if hasattr(type(self), name):
+            return object.__getattribute__(self, name)  # a property that failed: raises what it raised
         near = [] if name.startswith("_") else get_close_matches(name, [n for n in dir(self) if not n.startswith("_")], 1)
         raise AttributeError(f"a Case has no {name}" + (f"; did you mean {near[0]}?" if near else ""))
 
@@ -121,7 +123,7 @@ class Case(CaseKeys):
         """What a key is set to, or else its value by default or preset, in SI: case["contact.k_n"], case["stage.shear.strain"]."""
         table, leaf = self._table_of(name)
         if table is not None and leaf in table:
-            return table[leaf].unwrap()
+            return _plain(table[leaf])
         at = self._at(name)
         if at not in by_name:
             raise UnknownKey(self._judged(name, 0, why=True))
@@ -239,7 +241,7 @@ class Case(CaseKeys):
         document, blocks = self._document, []
 
         def lines(table, at):
-            return [f"{key.leaf} = {table[key.leaf].as_string()}" for key in keys_of(at) if key.leaf in table]
+            return [f"{key.leaf} = {tomlkit.item(table[key.leaf]).as_string()}" for key in keys_of(at) if key.leaf in table]
         blocks.append(lines(document, ""))
         for name in tables:
             if name and name not in listed and (own := lines(document.get(name, {}), name)):
@@ -304,7 +306,7 @@ class Case(CaseKeys):
             kind = head.get("kind", "")
             for leaf, value in head.items():
                 self._judged(f"{table}.{name}.{leaf}", value, kind=kind)
-                if leaf not in one or one[leaf].unwrap() != value:
+                if leaf not in one or _plain(one[leaf]) != value:
                     one[leaf] = toml_item(leaf, value)
             self._filled()  # a name that is none
             for leaf, value in keys.items():
@@ -407,6 +409,11 @@ class Listed(Mapping[str, Table], Generic[Table]):
 
 def _name_of(table, one):
     return "-".join(one.get("of", [])) if table == "pair" else one.get("name")
+
+
+def _plain(item):
+    """What tomlkit has, as Python has it; booleans it gives as they are."""
+    return item.unwrap() if hasattr(item, "unwrap") else item
 
 
 def toml_item(name, value):

@@ -160,6 +160,27 @@ def test_reading_gives_what_was_set_or_the_default(case):
     assert "mu_s = 0.3" in repr(case.contact) and "by default" in repr(case.contact)
 
 
+@pytest.mark.parametrize("name, value", [("box.floor", False), ("model.ledger", True), ("grains.seed", 7), ("model.dt", "auto"), ("model.dt", 1e-5),
+                                         ("grains.material", ""), ("stage.shear.fluid", True), ("stages", ["settle"]), ("contact.k_n", 1.16e7),
+                                         ("material.sand.sizes", ["1 mm", "1 cm"])])
+def test_what_was_set_is_read_again(case, name, value):
+    case.material("sand")
+    case[name] = value
+    assert case[name] == value and type(case[name]) is type(value)
+    case.write()
+    again = moraine.Case(case.directory)
+    assert again[name] == value and type(again[name]) is type(value) and again.text == case.text
+    del again[name]
+    assert not again.has(name)
+
+
+def test_numpy_numbers_are_numbers(case):
+    numpy = pytest.importorskip("numpy")
+    case.grains.seed, case.contact.k_n, case.box.floor = numpy.int64(3), numpy.float64(1e7), numpy.bool_(True)
+    assert (case.grains.seed, case.contact.k_n, case.box.floor) == (3, 1e7, True)
+    assert "seed = 3\n" in case.text and "k_n = 10000000.0\n" in case.text and "floor = true\n" in case.text
+
+
 def test_what_a_case_extends_is_read_too(case, tmp_path):
     case.contact.mu_s = 0.4
     case.write()
