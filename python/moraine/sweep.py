@@ -120,14 +120,18 @@ def sweep(case, values, *, progress, **options):
 
 
 def _run(case, sets, progress, *, threads, at_once, resume, force, backend):
+    def begin(say, show):
+        return _core.sweep(str(case.directory), sets, threads, backend, resume, force, at_once, say, show)
+    if not progress:
+        return begin(lambda line: None, lambda done, line: None)
+
     from tqdm.auto import tqdm
-    with tqdm(total=100, disable=not progress, bar_format="{l_bar}{bar}| {elapsed} {postfix}") as bar:
+    with tqdm(total=100, bar_format="{l_bar}{bar}| {elapsed} {postfix}") as bar:
         def say(line):
-            if progress:
-                tqdm.write(": ".join(line.split(": ")[:2]) if line.startswith("stopped") else line)  # the error at the end says why
+            tqdm.write(": ".join(line.split(": ")[:2]) if line.startswith("stopped") else line)  # the error at the end says why
 
         def show(done, line):
             bar.n = 100 * done
             cases, _, left = line.partition("%")
             bar.set_postfix_str(cases[:-7].strip() + left.replace("  ETA unknown", ""))  # the bar has the share
-        return _core.sweep(str(case.directory), sets, threads, backend, resume, force, at_once, say, show)
+        return begin(say, show)
