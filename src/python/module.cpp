@@ -54,7 +54,7 @@ nb::list keys() {
 std::string in_python(std::string words) {
   for (const auto& [option, argument] : {std::pair<std::string, std::string>{"--resume", "resume=True"},
                                          {"--force", "force=True"},
-                                         {"--set ", ""}})
+                                         {"--set ", "set "}})
     for (std::size_t at; (at = words.find(option)) != words.npos;) words.replace(at, option.size(), argument);
   return words;
 }
