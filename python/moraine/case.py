@@ -254,7 +254,8 @@ class Case(CaseKeys):
 
     @property
     def stages(self) -> "Listed[Stage]":
-        """The stages by name, in the order in which they run: case.stages["shear"].normal_stress = "40 kPa"."""
+        """The stages by name, in the order in which they run: case.stages["shear"].normal_stress = "40 kPa", or
+        case.stages.shear.normal_stress. Printed they are as in case.toml, with defaults."""
         return Listed(self, "stage")
 
     @property
@@ -388,6 +389,14 @@ class Listed(Mapping[str, Table], Generic[Table]):
         if self._table != "stage":
             return classes[self._table](self._case, at)
         return stage_classes[self._case[f"{at}.kind"]](self._case, at)
+
+    def __getattr__(self, name: str) -> Table:  # case.stages.shear, for names that are words: tab completion knows these
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return self[name]
+
+    def __dir__(self):
+        return [*super().__dir__(), *(name for name in self if name.isidentifier())]
 
     def __delitem__(self, name: str) -> None:
         self[name]

@@ -128,7 +128,9 @@ def test_a_key_that_there_is_not_is_also_an_attribute_error(case):
         case.titel = "x"
     with pytest.raises(moraine.Error, match="did you mean title"):
         moraine.Case("nowhere", titel="x")
-    assert not hasattr(case.contact, "_ipython_display_")
+    with pytest.raises(AttributeError, match="no stage 'sheer'; stages: settle, consolidate, shear"):
+        case.stages.sheer
+    assert not hasattr(case.contact, "_ipython_display_") and not hasattr(case.stages, "_ipython_display_")
 
 
 @pytest.mark.parametrize("value", [None, object(), {1: None}, [None]])
@@ -208,6 +210,7 @@ def test_stages_are_calls(tmp_path):
     # Shear keeps the stress of the stage before.
     assert [case.stages[name].normal_stress for name in ("shear", "shear-2", "creep")] == ["20 kPa"] * 3
     assert case.stages["uniaxial"].normal_stress == 0
+    assert case.stages.shear.strain == 0.1 and "shear" in dir(case.stages) and "shear-2" not in dir(case.stages)
     case.stages["shear"].normal_stress = {"ramp": ["20 kPa", "80 kPa"], "over": "0.5 s"}
     assert 'normal_stress = {ramp = ["20 kPa", "80 kPa"], over = "0.5 s"}' in case.text
     assert case.stages["shear"].normal_stress == {"ramp": ["20 kPa", "80 kPa"], "over": "0.5 s"}

@@ -170,4 +170,4 @@ def test_the_example_draws_its_figure(tmp_path):
     for _ in range(2):  # again, it goes on from the end
         ran = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, env=environment, capture_output=True, text=True)
         assert ran.returncode == 0, ran.stderr
-    assert (tmp_path / "three-stresses.png").stat().st_size > 10000 and "normal_stress-40kPa" in ran.stdout
+    assert (tmp_path / "three-stresses.png").stat().st_size > 10000 and "normal_stress-80kPa" in ran.stdout
