@@ -36,6 +36,10 @@ if(TARGET moraine_mpi)  # of this machine's MPI, and thus for this machine only
   install(TARGETS moraine_mpi LIBRARY DESTINATION bin COMPONENT mpi EXCLUDE_FROM_ALL)
 endif()
 
+if(SKBUILD AND NOT MORAINE_PORTABLE)  # by pip, for this machine: where libraries were found, there they are
+  set_target_properties(moraine _core PROPERTIES INSTALL_RPATH_USE_LINK_PATH ON)
+endif()
+
 set(CPACK_GENERATOR TGZ)
 set(CPACK_PACKAGE_FILE_NAME "moraine-${PROJECT_VERSION}-${CMAKE_SYSTEM_NAME}-${CMAKE_SYSTEM_PROCESSOR}")
 if(MORAINE_CUDA)
