@@ -32,8 +32,7 @@ Target target_of(Stage& stage, const std::string& key) {
   using Kind = dem::Drive::Kind;
   dem::Drive &wall = stage.scene.body(BodyId::top_wall).z, &layer = stage.scene.body(BodyId::top_layer).x;
   const auto expect = [&](bool right, const std::string& what) {
-    if (!right)
-      throw error(key, ": does not drive stage ", stage.name, ", ", what);
+    if (!right) throw error(key, ": does not drive stage ", stage.name, ", ", what);
   };
   if (key == "normal_stress") {
     expect(stage.scene.has(BodyId::top_wall) && wall.kind == Kind::stress,
@@ -80,8 +79,9 @@ double load_value(const std::string& key, const std::string& value) {
   if (std::ranges::find(loads, key) == loads.end()) {
     const std::string near = cases::nearest(key, loads);
     const bool known = cases::find("stage." + key) || cases::find(key);
-    throw error(stated, known ? ": stays as it is while a stage runs; " : ": unknown load; ",
-                near.empty() ? "what may change is " + cases::join(loads, ", ") : "did you mean " + near + "?");
+    throw error(
+        stated, known ? ": stays as it is while a stage runs; " : ": unknown load; ",
+        near.empty() ? "what may change is " + cases::join(loads, ", ") : "did you mean " + near + "?");
   }
   try {
     const cases::Value parsed = cases::parse_default(*cases::find("stage." + key), value);
@@ -105,11 +105,10 @@ bool has_load(const cases::Stage& asked, const Stage& stage, const std::string& 
 
 void apply(const LoadEvent& event, Stage& stage) {
   const Target target = target_of(stage, event.key);
-  (target.side ? target.side->history : *target.history) = {
-      .between = History::Between::steps,
-      .stays = true,
-      .time = {stage.scene.time(event.step)},
-      .value = {event.value}};
+  (target.side ? target.side->history : *target.history) = {.between = History::Between::steps,
+                                                            .stays = true,
+                                                            .time = {stage.scene.time(event.step)},
+                                                            .value = {event.value}};
   if (target.drive) set_pieces(stage.scene, stage.histories, event.step);
 }
 
@@ -130,9 +129,10 @@ std::vector<LoadEvent> read_events(const std::filesystem::path& file) {
     };
     const auto& loads = loads_from_outside();
     if (parts.size() != 4 || !read(parts[0], event.stage) || !read(parts[1], event.step) ||
-        std::ranges::find(loads, parts[2]) == loads.end() || !read(parts[3], event.value) || event.stage < 1 ||
-        event.step < 0)
-      throw error(file.string(), ":", line, ": ", words, ": expected ", header, ", such as 3,1200,normal_stress,4e4");
+        std::ranges::find(loads, parts[2]) == loads.end() || !read(parts[3], event.value) ||
+        event.stage < 1 || event.step < 0)
+      throw error(file.string(), ":", line, ": ", words, ": expected ", header,
+                  ", such as 3,1200,normal_stress,4e4");
     --event.stage, event.key = parts[2];
     events.push_back(event);
   }
@@ -159,7 +159,8 @@ void write_events(const std::filesystem::path& file, const std::vector<LoadEvent
 
 std::string describe(const LoadEvent& event, const std::string& stage) {
   const std::string unit = cases::find("stage." + event.key)->unit;
-  return text("event: stage ", stage, ", step ", event.step, ": ", event.key, " = ", number(event.value), " ", unit);
+  return text("event: stage ", stage, ", step ", event.step, ": ", event.key, " = ", number(event.value), " ",
+              unit);
 }
 
 }  // namespace moraine::run

@@ -32,7 +32,8 @@ bool is_of_water(const std::string& key);
 // names of snapshots. What a kill has left of a last line does not count. Throws Error naming file and line.
 std::vector<LoadEvent> read_events(const std::filesystem::path& file);
 void write_events(const std::filesystem::path& file, const std::vector<LoadEvent>& events);
-void append_event(const std::filesystem::path& file, const LoadEvent& event);  // survives a kill of the program
+void append_event(const std::filesystem::path& file,
+                  const LoadEvent& event);  // survives a kill of the program
 
 std::string describe(const LoadEvent& event, const std::string& stage);  // for the log
 

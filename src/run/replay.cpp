@@ -24,7 +24,8 @@ std::string first_difference(const std::vector<output::Row>& a, const std::vecto
 
 void replay_case(const Options& options) {
   if (!options.overrides.empty())
-    throw error("--set ", options.overrides[0].key, ": a replay runs what was run, and takes no other values");
+    throw error("--set ", options.overrides[0].key,
+                ": a replay runs what was run, and takes no other values");
   const Files original{options.directory / "output"};
   const output::Checkpoint before = output::read_checkpoint(original.checkpoint());
   catch_signals();
@@ -42,9 +43,10 @@ void replay_case(const Options& options) {
   const std::string where = runner.files().checkpoint().string() + " and " + original.checkpoint().string();
   if (output::digest_of_file(runner.files().checkpoint()) != output::digest_of_file(original.checkpoint())) {
     const std::string from = first_difference(before.rows, runner.rows());
-    throw error(where, " differ: ", from.empty() ? "but not in the series" : "the series" + from,
-                "; expected the same bits. Has the program, a file that the case reads, or an interval of output "
-                "changed since?");
+    throw error(
+        where, " differ: ", from.empty() ? "but not in the series" : "the series" + from,
+        "; expected the same bits. Has the program, a file that the case reads, or an interval of output "
+        "changed since?");
   }
   std::cout << "the same bits, with " << before.events.size() << " events and " << before.rows.size()
             << " rows: " << where << "\n";

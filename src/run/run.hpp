@@ -27,7 +27,7 @@ struct Options {
   int threads = 0;         // of each rank; 0: all
   Ranks* ranks = nullptr;  // that share the bed; this is rank 0. null: there are no others
   bool resume = false, force = false, quiet = false;
-  Ordering ordering;  // another gives other bits: for tests
+  Ordering ordering;                      // another gives other bits: for tests
   std::filesystem::path output;           // where results go; empty: directory/output
   std::vector<output::LoadEvent> events;  // of a run that begins: loads change at their steps
   bool drop_events = false;               // of a run that goes on: those after its checkpoint do not count

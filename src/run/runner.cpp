@@ -87,7 +87,8 @@ Runner::Runner(const Options& options, const cases::Case& c)
 
 template <class Action>
 void Runner::guarded(Action&& action) {
-  if (failed_) throw error("the run has stopped with an error; open it again with resume to go on from its checkpoint");
+  if (failed_)
+    throw error("the run has stopped with an error; open it again with resume to go on from its checkpoint");
   try {
     action();
   } catch (const std::exception& e) {
@@ -134,6 +135,10 @@ void Runner::checkpoint() {
 
 std::int64_t Runner::steps() const { return last_step(stage_) - stage_.first_step; }
 
+double Runner::time() const {
+  return was_finished_ ? now_.rows.back().time : now_.start.time + stage_.time(step_);
+}
+
 dem::State Runner::state() const { return was_finished_ ? now_.state : engine_->state(); }
 
 std::optional<coupling::WaterFields> Runner::water() const {
@@ -174,7 +179,8 @@ bool Runner::settle_old_output() {
     damage_ += "; going on from the checkpoint before it, " + before.string();
     std::error_code failed;
     fs::rename(before, newest, failed);  // or the next one would push the good one out
-    if (failed) throw error(newest.string(), ": cannot be replaced by ", before.string(), ": ", failed.message());
+    if (failed)
+      throw error(newest.string(), ": cannot be replaced by ", before.string(), ": ", failed.message());
   }
   return true;
 }
@@ -221,11 +227,13 @@ void Runner::take_events(bool resuming) {
   const std::vector<LoadEvent> all = read_events(files_.events());
   const auto known = static_cast<std::ptrdiff_t>(std::min(now_.events.size(), all.size()));
   if (!std::equal(all.begin(), all.begin() + known, now_.events.begin()))
-    throw error(files_.events().string(), ": does not begin with the ", now_.events.size(),
-                " events of the checkpoint; undo the change, or remove the file to go on without those after it");
+    throw error(
+        files_.events().string(), ": does not begin with the ", now_.events.size(),
+        " events of the checkpoint; undo the change, or remove the file to go on without those after it");
   if (!options_.drop_events) to_come_.assign(all.begin() + known, all.end());
   if (!to_come_.empty())
-    progress_->say(text("events after the checkpoint, which are met again at their steps: ", to_come_.size()));
+    progress_->say(
+        text("events after the checkpoint, which are met again at their steps: ", to_come_.size()));
   if (!all.empty() || !now_.events.empty()) write_events(files_.events(), all_events());
 }
 
@@ -344,7 +352,8 @@ std::int64_t Runner::go_on(std::int64_t most) {
       if (due || guard_->finds_healthy(now_.state)) save();
     }
     if (stop)
-      throw Interrupted(text("interrupted at step ", done(), " of stage ", stage_.name, "; --resume goes on from here"));
+      throw Interrupted(
+          text("interrupted at step ", done(), " of stage ", stage_.name, "; --resume goes on from here"));
     if (stage_ended_) end();
   }
   return step_ - first;
@@ -499,7 +508,8 @@ void Runner::say_stress() {
   for (const double stress : {row.stress_x, row.stress_y, row.stress_z})
     if (std::abs(stress - stage_.pressure) > 0.05 * stage_.pressure) {
       progress_->say(text("warning: stage ", stage_.name, " ends with ", row.stress_x, ", ", row.stress_y,
-                          " and ", row.stress_z, " Pa along x, y and z, not with pressure = ", stage_.pressure,
+                          " and ", row.stress_z,
+                          " Pa along x, y and z, not with pressure = ", stage_.pressure,
                           " Pa; a longer duration or a larger strain_rate would get nearer"));
       return;
     }

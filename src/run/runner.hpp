@@ -63,21 +63,22 @@ class Runner {
   // Throws Error where it is no load of this stage.
   void set(const std::string& load, double value);
 
-  bool finished() const { return now_.finished; }       // the whole case
-  bool was_finished() const { return was_finished_; }   // by an earlier run
-  bool stage_ended() const { return stage_ended_; }     // the present one
+  bool finished() const { return now_.finished; }      // the whole case
+  bool was_finished() const { return was_finished_; }  // by an earlier run
+  bool stage_ended() const { return stage_ended_; }    // the present one
   const Stage& stage() const { return stage_; }
   std::size_t stage_index() const { return static_cast<std::size_t>(now_.stage); }
-  std::int64_t step_number() const { return step_; }    // of the scene's clock
+  std::int64_t step_number() const { return step_; }               // of the scene's clock
   std::int64_t done() const { return step_ - stage_.first_step; }  // steps since the stage began
   std::int64_t steps() const;                                      // of the whole stage, as dt is now
+  double time() const;                                             // s, since the case began
   const std::vector<output::Row>& rows() const { return now_.rows; }
   const std::vector<LoadEvent>& events() const { return now_.events; }
   const cases::Case& what() const { return case_; }
   const Files& files() const { return files_; }
 
-  dem::State state() const;                             // as Engine::state()
-  std::optional<coupling::WaterFields> water() const;   // none: dry
+  dem::State state() const;                            // as Engine::state()
+  std::optional<coupling::WaterFields> water() const;  // none: dry
 
  private:
   // What fails ends the run, with one error that names the checkpoint that is left.
