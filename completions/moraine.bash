@@ -4,14 +4,14 @@ _moraine() {
   root=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/..
   for ((i = 1; i < COMP_CWORD; ++i)); do
     case ${COMP_WORDS[i]} in
-      run | sweep | check | keys | bench | export | import-sphere | watch | figures | report | reproduce | test)
+      run | sweep | check | keys | bench | export | import-sphere | watch | figures | report | reproduce | cases | test)
         command=${COMP_WORDS[i]}
         break
         ;;
     esac
   done
   case $command in
-    '') words="run sweep check keys bench export import-sphere watch figures report reproduce test --help --version --cuda" ;;
+    '') words="run sweep check keys bench export import-sphere watch figures report reproduce cases test --help --version --cuda" ;;
     run) words="--resume --force --quiet --set --backend --threads --ranks --help" ;;
     sweep) words="--resume --force --quiet --set --at-once --backend --threads --help" ;;
     check) words="--set --backend --threads --help" ;;
@@ -21,7 +21,7 @@ _moraine() {
     report) words="--output --notes --help" ;;
     reproduce) words="--preset --seeds --quick --set --settled --output --cores --gpu --cluster --cluster-options --dry-run --help" ;;
     export) words="--format --output --help" ;;
-    import-sphere | keys) words="--help" ;;
+    import-sphere | keys | cases) words="--help" ;;
   esac
   case $previous in
     --backend) words="cpu cuda auto" ;;
@@ -32,7 +32,7 @@ _moraine() {
   COMPREPLY=()
   if [[ ! $command || $word == -* || $previous == @(--backend|--preset|--format) ]]; then
     mapfile -t COMPREPLY < <(compgen -W "$words" -S ' ' -- "$word")
-  elif [[ $command == import-sphere || $previous == @(--png|--output|--notes) ]]; then
+  elif [[ $command == @(import-sphere|cases) || $previous == @(--png|--output|--notes) ]]; then
     compopt -o filenames +o nospace
     mapfile -t COMPREPLY < <(compgen -f -- "$word")
   elif [[ $command == reproduce ]]; then  # by name

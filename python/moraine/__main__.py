@@ -1,23 +1,50 @@
-"""Commands on results: python3 -m moraine COMMAND, or ./moraine COMMAND. Each module named here has arguments(parser) and run(args)."""
+"""The command moraine of an environment that has the package, and python3 -m moraine: those on results are Python, all others are
+the program's, which then takes the place of this process. In the sources the launcher ./moraine tells them apart.
+
+Each module named here has arguments(parser) and run(args).
+"""
 import argparse
 import difflib
 import importlib
+import os
+import subprocess
 import sys
 
-from .results import MissingData
+from . import places
 
 commands = {  # name: (module, what it does)
     "watch": ("watch", "follow a running case: friction, dilation and energy as they grow"),
     "figures": ("figures", "draw the paper's figures of one case, or of several beside each other"),
     "report": ("report", "measure the runs of a study and hold them against what was published"),
     "reproduce": ("reproduce", "run a study that is described in cases/, and draw its figures and report"),
+    "cases": ("example_cases", "copy the cases that come with the package, to run and to change them"),
 }
 
 
+def for_program(words):
+    """Gives these words to the program instead, where it is installed and they are not one of the commands here."""
+    program = places.program()
+    if not program or words[:1] and words[0] in commands:
+        return
+    if not words:
+        overview = subprocess.run([program], check=True, capture_output=True, text=True).stdout
+        print(overview.replace(" watch and figures need the launcher ./moraine.", "").replace("./moraine", "moraine"), end="")
+        sys.exit(0)
+    if words[0] not in ("-h", "--help"):
+        os.execv(program, ["moraine", *words])
+    subprocess.run([program, "--help"], check=True)
+    for name, (_, what) in commands.items():
+        print(f"  {name:<27} {what}")
+    sys.exit(0)
+
+
 def main(words=None):
+    words = sys.argv[1:] if words is None else words
+    for_program(words)
+    from .sealed import MissingData  # not before: the program's commands need no NumPy
+
     parser = argparse.ArgumentParser(prog="moraine", description="Follows, measures and draws results.")
     parsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    words = sys.argv[1:] if words is None else words
     options = []  # of the command
     for name, (module, what) in commands.items():
         sub = parsers.add_parser(name, help=what, description=what[0].upper() + what[1:] + ".")

@@ -3,9 +3,9 @@ from pathlib import Path
 import re
 import shutil
 
+from .places import root
 from .results import MissingData
 
-root = Path(__file__).resolve().parents[2]
 kept = root / "cases/cluster"   # profiles
 
 

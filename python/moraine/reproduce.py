@@ -7,11 +7,10 @@ import shutil
 import signal
 import subprocess
 
-from . import cluster
+from . import cluster, places
+from .places import root
 from .results import MissingData
 from .study import Study, read
-
-root = Path(__file__).resolve().parents[2]
 
 
 def studies():
@@ -63,7 +62,7 @@ def study_of(args, home):
             raise MissingData(f"--set {text}: expected the full name of the key, such as wall.mass; ./moraine keys lists them")
         else:
             settings[key] = value
-    moraine, step = os.environ.get("MORAINE_LAUNCHER", str(root / "moraine")), ""
+    moraine, step = os.environ.get("MORAINE_LAUNCHER", str(places.program() or root / "moraine")), ""
     if args.cluster:
         step = cluster.step(cluster.profile(args.cluster))
         if moraine == str(root / "moraine") and (root / "build/moraine").exists():
@@ -107,6 +106,8 @@ def last_value(values):
 
 def run(args):
     home = root / "cases" / args.NAME
+    if not (root / "cases/Snakefile").exists():
+        raise MissingData(f"there is no {root}/cases/Snakefile; `moraine cases` copies the cases with their workflow to here")
     if not (home / "study.toml").exists():
         raise MissingData(f"there is no {home}/study.toml; studies: {', '.join(studies()) or 'none (they are in the repository)'}")
     if args.cluster_options and not args.cluster:
@@ -114,7 +115,7 @@ def run(args):
     study = study_of(args, home)  # first, so that what is wrong with it is said before anything is to be installed
     snakemake = shutil.which("snakemake")
     if not snakemake:
-        raise MissingData("snakemake is not installed (Debian: apt-get install snakemake)")
+        raise MissingData("snakemake is not installed (Debian: apt-get install snakemake; in a virtual environment: pip install 'moraine[workflow]')")
     held = [] if args.dry_run else hold(study)
     if not args.dry_run:
         study.write_cases()
@@ -123,7 +124,7 @@ def run(args):
                # What has been computed stays valid when only words of the workflow change.
                "--rerun-triggers", "mtime", "--keep-going", "--rerun-incomplete",
                "--nolock"]  # Snakemake's own lock outlives a power cut, and then wants to be removed by hand
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [str(root / "python"), os.environ.get("PYTHONPATH")]))}
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [str(places.on_path), os.environ.get("PYTHONPATH")]))}
     if args.cluster:
         profile = cluster.profile(args.cluster)
         command += cluster.words(profile, args.cores)

@@ -11,19 +11,19 @@
 #include <immintrin.h>
 #endif
 
-// Whether fma rounds once, as it does on every processor but x86-64 before FMA: bits are the same on all
-// those.
-#if defined(__FMA__) || defined(__CUDA_ARCH__) || defined(__aarch64__)
-#define MORAINE_FMA
+// x86-64 without FMA: fma takes other instructions, and a multiple of the time, for the same bits.
+#if defined(__x86_64__) && !defined(__FMA__) && !defined(__CUDACC__)
+#define MORAINE_EMULATES_FMA
+#include "backend/exact_fma.hpp"
 #endif
 
 namespace moraine {
 
 MORAINE_HD double fma(double a, double b, double c) {
-#if defined(MORAINE_FMA)
-  return ::fma(a, b, c);
+#if defined(MORAINE_EMULATES_FMA)
+  return exact::fma(exact::Two{a, a}, exact::Two{b, b}, exact::Two{c, c})[0];
 #else
-  return a * b + c;  // a processor without fma: emulating it would cost a hundredfold
+  return ::fma(a, b, c);
 #endif
 }
 MORAINE_HD double fnma(double a, double b, double c) { return fma(-a, b, c); }  // c - a b
@@ -98,14 +98,19 @@ struct Pack {
 #if defined(__FMA__)
 inline Pack fma(Pack a, Pack b, Pack c) { return _mm256_fmadd_pd(a.v, b.v, c.v); }
 inline Pack fnma(Pack a, Pack b, Pack c) { return _mm256_fnmadd_pd(a.v, b.v, c.v); }
-#elif defined(MORAINE_FMA)  // lane by lane; compilers make vectors of it
+#elif defined(MORAINE_EMULATES_FMA)
+inline Pack fma(Pack a, Pack b, Pack c) {
+  const auto low = [](Pack p) { return __builtin_shufflevector(p.v, p.v, 0, 1); };
+  const auto high = [](Pack p) { return __builtin_shufflevector(p.v, p.v, 2, 3); };
+  return Pack::Lanes(__builtin_shufflevector(exact::fma(low(a), low(b), low(c)),
+                                             exact::fma(high(a), high(b), high(c)), 0, 1, 2, 3));
+}
+inline Pack fnma(Pack a, Pack b, Pack c) { return fma(-a, b, c); }
+#else  // lane by lane; compilers make vectors of it
 inline Pack fma(Pack a, Pack b, Pack c) {
   return {::fma(a[0], b[0], c[0]), ::fma(a[1], b[1], c[1]), ::fma(a[2], b[2], c[2]), ::fma(a[3], b[3], c[3])};
 }
 inline Pack fnma(Pack a, Pack b, Pack c) { return fma(-a, b, c); }
-#else
-inline Pack fma(Pack a, Pack b, Pack c) { return a * b + c; }
-inline Pack fnma(Pack a, Pack b, Pack c) { return c - a * b; }
 #endif
 #if defined(__AVX__)
 inline Pack sqrt(Pack a) { return _mm256_sqrt_pd(a.v); }

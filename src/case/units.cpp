@@ -1,5 +1,6 @@
 #include "case/units.hpp"
 
+#include <dlfcn.h>
 #include <udunits2.h>
 
 #include <algorithm>
@@ -23,13 +24,28 @@ struct Free {
 template <class T>
 using Owned = std::unique_ptr<T, Free>;
 
-// The table of units that came along with the program; empty: that of the machine, or of UDUNITS2_XML_PATH.
-std::string table_beside_program() {
+// The file that holds this code: the program, or a library where a process of Python has loaded it.
+std::filesystem::path own_file() {
   std::error_code none;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", none);
-  const auto table = program.parent_path().parent_path() / "share/udunits/udunits2.xml";
-  if (std::getenv("UDUNITS2_XML_PATH") || !std::filesystem::exists(table, none)) return "";
-  return table.string();
+  Dl_info info{};
+  if (!dladdr(reinterpret_cast<const void*>(&own_file), &info) || !info.dli_fname) return program;
+  const auto file = std::filesystem::absolute(info.dli_fname, none);
+  return file.string().ends_with(".so") ? file : program;  // of a program it has only what was typed
+}
+
+// The table of units that came along with the program, in share/udunits of a folder above it; empty: that of
+// the machine, or of UDUNITS2_XML_PATH.
+std::string table_beside_program() {
+  if (std::getenv("UDUNITS2_XML_PATH")) return "";
+  std::error_code none;
+  auto folder = own_file().parent_path();
+  for (int up = 0; up < 4;
+       ++up, folder = folder.parent_path()) {  // lib/glibc-hwcaps/x86-64-v3 is three below
+    const auto table = folder / "share/udunits/udunits2.xml";
+    if (std::filesystem::exists(table, none)) return table.string();
+  }
+  return "";
 }
 
 ut_system* unit_system() {

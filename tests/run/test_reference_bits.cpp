@@ -66,9 +66,6 @@ class ReferenceBits : public Program, public testing::WithParamInterface<Referen
   }
 
   void SetUp() override {
-#ifndef MORAINE_FMA
-    GTEST_SKIP() << "compiled without FMA, which rounds otherwise; the table was made with it";
-#endif
     if (GetParam().wet() && !coupling::water_built()) GTEST_SKIP() << "this build has no pore water in it";
     if (GetParam().start == std::string("imported") && !fs::exists(imported_bed))
       GTEST_SKIP() << "no " << imported_bed;
