@@ -46,7 +46,8 @@ html_copy_source = False
 mathjax_home = Path("/usr/share/javascript/mathjax")
 if (mathjax_home / "MathJax.js").exists():
     mathjax_path = "mathjax/MathJax.js?config=TeX-AMS_CHTML"
-    mathjax2_config = {"showMathMenu": False, "messageStyle": "none"}
+    mathjax2_config = {"showMathMenu": False, "messageStyle": "none", "tex2jax": {"processClass": "math"}}
+    myst_update_mathjax = False  # that is for version 3; Debian has 2.7
 
 
 def copy_mathjax(app, exception):

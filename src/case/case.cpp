@@ -389,8 +389,7 @@ string one_line(const string& text) {
   return line;
 }
 
-Case load_checked(const fs::path& directory, const std::vector<Override>& overrides) {
-  Draft draft = read(directory, overrides);
+Case checked_case(const fs::path& directory, Draft draft) {
   apply_preset(draft);
   const string file = (directory / "case.toml").string();
   Case c{};
@@ -449,10 +448,14 @@ bool Case::presses() const {
 
 Case load(const fs::path& directory, const std::vector<Override>& overrides) {
   try {
-    return load_checked(directory, overrides);
+    return checked_case(directory, read(directory, overrides));
   } catch (const Error& e) {
     throw Error(one_line(e.what()));
   }
+}
+
+Case load_resolved(const fs::path& directory, const string& text) {
+  return checked_case(directory, read_resolved_case(directory, text));
 }
 
 std::vector<Change> changes(const string& resolved_before, const Case& now) {

@@ -210,6 +210,15 @@ class File {
     }
   }
 
+  // A resolved case of that directory.
+  File(const fs::path& directory, const string& text) : directory_(directory), root_(directory) {
+    try {
+      table_ = toml::parse(text);
+    } catch (const toml::parse_error& e) {
+      throw error("the resolved case: line ", e.source().begin.line, ": ", e.description());
+    }
+  }
+
   fs::path path() const { return directory_ / "case.toml"; }
 
   // "" or the directory of the case that this one extends, and the words for errors about it.
@@ -414,6 +423,12 @@ Draft read(const fs::path& directory, const std::vector<Override>& overrides) {
   set_all(false, false);
   select_stages(draft);
   set_all(true, true), set_all(true, false);
+  return draft;
+}
+
+Draft read_resolved_case(const fs::path& directory, const string& text) {
+  Draft draft;
+  File(directory, text).merge_into(draft);
   return draft;
 }
 

@@ -36,6 +36,8 @@ struct Draft {
 // Throws Error, see case.hpp.
 Draft read(const std::filesystem::path& directory, const std::vector<Override>& overrides);
 
+Draft read_resolved_case(const std::filesystem::path& directory, const std::string& text);
+
 // All keys of a resolved case, by full name ("stage.shear.f"), as they stand there, and its "stages".
 std::map<std::string, std::string> read_resolved(const std::string& text);
 

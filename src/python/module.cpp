@@ -3,6 +3,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "bindings.hpp"
 #include "case/case.hpp"
 #include "case/keys.hpp"
 #include "error.hpp"
@@ -11,6 +12,16 @@ namespace nb = nanobind;
 using namespace moraine;
 
 namespace {
+
+PyObject* error_type = nullptr;
+
+// What a remedy is called here.
+std::string in_python(std::string words) {
+  for (const auto& [option, argument] :
+       {std::pair<std::string, std::string>{"--resume", "resume=True"}, {"--force", "force=True"}})
+    for (std::size_t at; (at = words.find(option)) != words.npos;) words.replace(at, option.size(), argument);
+  return words;
+}
 
 nb::list keys() {
   nb::list rows;
@@ -27,7 +38,16 @@ nb::list keys() {
 }  // namespace
 
 NB_MODULE(_core, m) {
-  nb::exception<Error>(m, "Error");
+  error_type = PyErr_NewException("moraine.Error", PyExc_RuntimeError, nullptr);
+  m.attr("Error") = nb::handle(error_type);
+  nb::register_exception_translator([](const std::exception_ptr& thrown, void*) {
+    try {
+      std::rethrow_exception(thrown);
+    } catch (const Error& e) {
+      PyErr_SetString(error_type, in_python(e.what()).c_str());
+    }
+  });
   m.attr("version") = MORAINE_VERSION;
   m.def("keys", &keys, "The table of the keys of case.toml, a dict for each row.");
+  bind_run(m);
 }
