@@ -17,13 +17,13 @@ copyright = author = "the Moraine developers"  # noqa: A001
 version = release = next(line.split('"')[1] for line in (root / "python/moraine/__init__.py").read_text().splitlines()
                          if line.startswith("__version__"))
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "moraine_manual"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "moraine_manual"]
 root_doc = "docs/manual/index"
 include_patterns = ["docs/**.md", "CONTRIBUTING.md", "bench/results/*.md", "cases/**/README.md", "cases/**/report.md",
                     "cases/**/notes-fast.md"]
 exclude_patterns = ["build*", ".*", "shared", "src", "tests", "python", "cases/**/output", "cases/**/sweep", "cases/**/runs"]
 suppress_warnings = ["myst.header"]  # reports of studies begin their sections where they like
-nitpick_ignore_regex = [("py:.*", r"(?!moraine\.).*")]  # what NumPy, h5py and others call their own
+nitpick_ignore_regex = [("py:.*", r"(?!moraine\.).*|moraine\._core\..*")]  # what NumPy, h5py and others call their own
 
 myst_enable_extensions = ["dollarmath", "deflist", "colon_fence"]
 myst_heading_anchors = 4

@@ -5,9 +5,11 @@ A page has a line <!-- generated: WHAT --> where one of these goes:
     presets, loads   what stands below the list of `moraine keys`
     series           the columns of series.h5
     help COMMAND     what `moraine COMMAND --help` prints
+    api, internal    the modules of python/moraine: those for users with their docstrings, the others as a list
 The role {src}`src/dem/law/contact.hpp: grip()` names a file of the sources, and functions or types in it. A file or name that is
 not there is a warning, so that the manual follows the code.
 """
+import ast
 import json
 import os
 import re
@@ -90,7 +92,7 @@ def keys():
         kind = {"number": "a number" + (f" in{unit}" if unit else ""), "integer": "a whole number", "boolean": "true or false",
                 "text": "a text", "choice": "a word", "path": "a path", "list": "a list",
                 "load": f"a number in{unit} or [a history](#a-load-that-changes)"}[key["type"]]
-        meaning = escaped(key["meaning"].replace("; or a history, see below", "").replace("; see below", "; see [presets](#presets)"))
+        meaning = linked(escaped(key["meaning"].replace("; or a history, see below", "").replace("; see below", "; see [presets](#presets)")), name)
         lines += [f"```{{key}} {name}", f"{meaning[:1].upper() + meaning[1:]}.", "",
                   "; ".join([kind[:1].upper() + kind[1:], *filter(None, facts)]) + ".", "```", ""]
     return "\n".join(lines)
@@ -103,6 +105,12 @@ def reference_to(name):
 def escaped(text):
     """Plain words of the program, as Markdown shows them unchanged."""
     return re.sub(r"([\\*_$<>\[\]{}^|#])", r"\\\1", text)
+
+
+def linked(text, own):
+    """Other keys that a meaning names by their full names become links."""
+    names = {key["name"] for key in tables()["keys"]}
+    return re.sub(r"\b[a-z]+\.[a-z_\\]+\b", lambda m: f"{{key}}`{plain}`" if (plain := m[0].replace("\\", "")) in names and plain != own else m[0], text)
 
 
 def series():
@@ -129,7 +137,42 @@ def help_of(command):
     return "```text\n" + text.strip().replace(str(root) + "/", "") + "\n```"
 
 
+# Modules that serve commands and reports; so do those of commands, and all *_report. Others are for users.
+inside = {"__main__", "cluster", "core", "measure", "page", "paper", "progress", "sealed", "spheres", "study", "study_runs", "style", "tables",
+          "textplot"}
+first = ["case", "sweep", "run", "results", "strength", "dilatancy", "shearing", "profile", "forces", "section", "rotation", "compaction", "intervals"]
+
+
+def modules():
+    """Names of the modules: for users, in the order of the page, and inside."""
+    sys.path.insert(0, str(root / "python"))
+    from moraine.__main__ import commands
+    names = sorted(path.stem for path in (root / "python/moraine").glob("*.py") if path.stem != "__init__")
+    internal = [name for name in names if name in inside or name.endswith("_report") or name in (module for module, _ in commands.values())]
+    public = [name for name in names if name not in internal]
+    return sorted(public, key=lambda name: (first.index(name) if name in first else len(first), name)), internal
+
+
+def api():
+    return "\n\n".join(f"(module-{name})=\n## moraine.{name}\n\n```{{eval-rst}}\n.. automodule:: moraine.{name}\n```" for name in modules()[0])
+
+
+def internal():
+    def about(name):
+        text = ast.get_docstring(ast.parse((root / f"python/moraine/{name}.py").read_text())) or ""
+        return escaped(text.split("\n\n")[0].split("\n")[0].strip())
+    return "\n".join(["| module | what |", "|---|---|", *(f"| `{name}` | {about(name)} |" for name in modules()[1])])
+
+
+def case_row():
+    return ("| {py:class}`moraine.Case <moraine.case.Case>` | builds, edits, checks, runs and sweeps a case |"
+            if "case" in modules()[0] else "")
+
+
 makers = {
+    "api": api,
+    "internal": internal,
+    "case-row": case_row,
     "keys": keys,
     "series": series,
     "loads": lambda: below_the_list("A load may change", "\nWhat model.preset"),
@@ -167,14 +210,24 @@ def src(role, rawtext, text, lineno, inliner, options=None, content=()):
     return [nodes.literal(rawtext, text)], []
 
 
-def plain_backticks(app, what, name, obj, options, lines):
-    """Docstrings write `name` for code, as Markdown does."""
-    lines[:] = [re.sub(r"(?<![`:\w])`([^`]+)`(?!`)", r"``\1``", line) for line in lines]
+def as_rst(app, what, name, obj, options, lines):
+    """Docstrings are plain text with `name` for code; what is indented stands as it is."""
+    out, inside_block = [], False
+    for line in lines:
+        indented = line.startswith(" ")
+        if indented and not inside_block:
+            out += ["", "::", ""]
+        if line.strip() and not indented and inside_block:
+            out.append("")
+        if line.strip():
+            inside_block = indented
+        out.append(line if indented else re.sub(r"[|*]", r"\\\g<0>", re.sub(r"(?<![`:\w])`([^`]+)`(?!`)", r"``\1``", line)))
+    lines[:] = out
 
 
 def setup(app):
     app.add_object_type("key", "key", objname="key of case.toml", indextemplate="single: %s (key)")
     app.add_role("src", src)
     app.connect("source-read", fill_in)
-    app.connect("autodoc-process-docstring", plain_backticks, priority=100)
+    app.connect("autodoc-process-docstring", as_rst, priority=100)
     return {"parallel_read_safe": True}
