@@ -3,9 +3,9 @@
 The source directory is the root of the repository, so that pages link to each other, to the studies and to the measurements by
 the same paths in the manual and where the repository is read.
 """
-import os
 import shutil
 import sys
+import types
 from pathlib import Path
 
 here = Path(__file__).resolve().parent
@@ -30,11 +30,11 @@ myst_heading_anchors = 4
 myst_dmath_allow_digits = False
 myst_dmath_allow_space = False
 
-autodoc_mock_imports = ["moraine._core"]  # compiled; the manual is built from the sources
 autodoc_member_order = "bysource"
-autodoc_typehints = "description"
+autodoc_typehints = "signature"
 autodoc_default_options = {"members": True, "undoc-members": True}
 
+highlight_language = "none"  # of blocks that name no language: commands in a shell
 html_theme = "furo"
 html_title = f"Moraine {version}"
 html_static_path = ["_static"]
@@ -48,6 +48,24 @@ if (mathjax_home / "MathJax.js").exists():
     mathjax_path = "mathjax/MathJax.js?config=TeX-AMS_CHTML"
     mathjax2_config = {"showMathMenu": False, "messageStyle": "none", "tex2jax": {"processClass": "math"}}
     myst_update_mathjax = False  # that is for version 3; Debian has 2.7
+
+
+# The compiled part of the package is not there: the manual is built from the sources. Its table of keys, from which the package makes
+# classes, comes from the program.
+class Core(types.ModuleType):
+    version, Error = version, type("Error", (RuntimeError,), {"__module__": "moraine"})
+
+    def keys(self):
+        from moraine_manual import tables
+        return tables()["keys"]
+
+    def __getattr__(self, name):
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return type(name, (), {"__module__": "moraine._core"})
+
+
+sys.modules["moraine._core"] = Core("moraine._core")
 
 
 def copy_mathjax(app, exception):

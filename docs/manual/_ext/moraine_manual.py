@@ -165,7 +165,7 @@ def internal():
 
 
 def case_row():
-    return ("| {py:class}`moraine.Case <moraine.case.Case>` | builds, edits, checks, runs and sweeps a case |"
+    return ("| {py:class}`moraine.Case <moraine.case.Case>` | builds, edits, checks, runs and sweeps a case |\n"
             if "case" in modules()[0] else "")
 
 
