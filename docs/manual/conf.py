@@ -23,7 +23,7 @@ include_patterns = ["docs/**.md", "CONTRIBUTING.md", "bench/results/*.md", "case
                     "cases/**/notes-fast.md"]
 exclude_patterns = ["build*", ".*", "shared", "src", "tests", "python", "cases/**/output", "cases/**/sweep", "cases/**/runs"]
 suppress_warnings = ["myst.header"]  # reports of studies begin their sections where they like
-nitpick_ignore_regex = [("py:.*", r"(?!moraine\.).*|moraine\._core\..*")]  # what NumPy, h5py and others call their own
+nitpick_ignore_regex = [("py:.*", r"(?!moraine\.).*|moraine\.(_core|tables)\..*")]  # what NumPy, h5py and others call their own
 
 myst_enable_extensions = ["dollarmath", "deflist", "colon_fence"]
 myst_heading_anchors = 4

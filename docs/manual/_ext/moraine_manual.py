@@ -5,6 +5,7 @@ A page has a line <!-- generated: WHAT --> where one of these goes:
     presets, loads   what stands below the list of `moraine keys`
     series           the columns of series.h5
     help COMMAND     what `moraine COMMAND --help` prints
+    gallery          the figures of the studies, as their reports have them
     api, internal    the modules of python/moraine: those for users with their docstrings, the others as a list
 The role {src}`src/dem/law/contact.hpp: grip()` names a file of the sources, and functions or types in it. A file or name that is
 not there is a warning, so that the manual follows the code.
@@ -154,7 +155,10 @@ def modules():
 
 
 def api():
-    return "\n\n".join(f"(module-{name})=\n## moraine.{name}\n\n```{{eval-rst}}\n.. automodule:: moraine.{name}\n```" for name in modules()[0])
+    def page(name):
+        more = "   :inherited-members:\n" if name == "case" else ""  # calls for stages are made from the table of keys
+        return f"(module-{name})=\n## moraine.{name}\n\n```{{eval-rst}}\n.. automodule:: moraine.{name}\n{more}```"
+    return "\n\n".join(page(name) for name in modules()[0])
 
 
 def internal():
@@ -162,6 +166,19 @@ def internal():
         text = ast.get_docstring(ast.parse((root / f"python/moraine/{name}.py").read_text())) or ""
         return escaped(text.split("\n\n")[0].split("\n")[0].strip())
     return "\n".join(["| module | what |", "|---|---|", *(f"| `{name}` | {about(name)} |" for name in modules()[1])])
+
+
+def gallery():
+    """The figures of the reports in cases/*/results, with their captions."""
+    parts = []
+    for report in sorted(root.glob("cases/*/results/report.md"), key=lambda path: (path.parts[-3] != "paper-2013", path)):
+        study = report.parts[-3]
+        title = re.search(r"^# (.*)$", (report.parents[1] / "README.md").read_text(), re.M)[1]
+        parts += ["", f"## {title}", "", f"From the [report](../../cases/{study}/results/report.md) of [cases/{study}](../../cases/{study}/README.md):", "",
+                  "```", f"./moraine reproduce {study}" + (" --preset fast --seeds 3" if study == "paper-2013" else ""), "```", ""]
+        for name, file, caption in re.findall(r"^!\[(.*?)\]\((figures/[\w.-]+\.png)\)\n\n(\*.*\*)$", report.read_text(), re.M):
+            parts += [f"![{name}](../../cases/{study}/results/{file})", "", caption, ""]
+    return "\n".join(parts)
 
 
 def case_row():
@@ -173,6 +190,7 @@ makers = {
     "api": api,
     "internal": internal,
     "case-row": case_row,
+    "gallery": gallery,
     "keys": keys,
     "series": series,
     "loads": lambda: below_the_list("A load may change", "\nWhat model.preset"),
