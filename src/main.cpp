@@ -1,4 +1,4 @@
-// moraine: grain-scale till mechanics. Each command reads a case directory; see README.md.
+// moraine: grain-scale till mechanics. Each command reads a case directory; see docs/manual.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>

@@ -17,7 +17,7 @@ copyright = author = "the Moraine developers"  # noqa: A001
 version = release = next(line.split('"')[1] for line in (root / "python/moraine/__init__.py").read_text().splitlines()
                          if line.startswith("__version__"))
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "moraine_manual"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "moraine_manual", "inner_links"]
 root_doc = "docs/manual/index"
 include_patterns = ["docs/**.md", "CONTRIBUTING.md", "bench/results/*.md", "cases/**/README.md", "cases/**/report.md",
                     "cases/**/notes-fast.md"]
@@ -56,7 +56,7 @@ class Core(types.ModuleType):
     version, Error = version, type("Error", (RuntimeError,), {"__module__": "moraine"})
 
     def keys(self):
-        from moraine_manual import tables
+        from contents import tables
         return tables()["keys"]
 
     def __getattr__(self, name):
