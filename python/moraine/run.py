@@ -55,6 +55,8 @@ class Run:
         water a run stops at steps at which grains and water meet, so it may go some steps further. Callbacks are called on the way.
         Control-C writes a checkpoint and raises KeyboardInterrupt; the run may then go on.
         """
+        if steps < 0:
+            raise Error(f"step({steps}): expected 0 steps or more")
         first, stage, done = self.step_number, self.stage_index, 0
         while done < steps and not self.finished and self.stage_index == stage:
             at = first + done

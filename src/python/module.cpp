@@ -17,8 +17,9 @@ PyObject* error_type = nullptr;
 
 // What a remedy is called here.
 std::string in_python(std::string words) {
-  for (const auto& [option, argument] :
-       {std::pair<std::string, std::string>{"--resume", "resume=True"}, {"--force", "force=True"}})
+  for (const auto& [option, argument] : {std::pair<std::string, std::string>{"--resume", "resume=True"},
+                                         {"--force", "force=True"},
+                                         {"--set ", "set "}})
     for (std::size_t at; (at = words.find(option)) != words.npos;) words.replace(at, option.size(), argument);
   return words;
 }
