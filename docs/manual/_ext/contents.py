@@ -189,7 +189,7 @@ def commands():
 
 
 # Modules that serve commands and reports; so do those of commands, and all *_report.
-inside = {"__main__", "cluster", "core", "example_cases", "measure", "page", "paper", "places", "progress", "sealed", "spheres", "study",
+inside = {"__main__", "cluster", "core", "example_cases", "frames", "measure", "page", "paper", "places", "progress", "sealed", "spheres", "study",
           "study_runs", "style", "tables", "textplot"}
 for_users = ["case", "sweep", "run", "results", "strength", "dilatancy", "shearing", "profile", "forces", "section", "rotation",
              "compaction", "intervals", "bed_figures", "force_figures", "water_figures"]
@@ -231,6 +231,33 @@ def gallery():
     return "\n".join(parts)
 
 
+def notebooks():
+    """Those in docs/manual/notebooks, with their results as they are kept in them."""
+    def fenced(language, text):
+        return f"````{language}\n{text.rstrip()}\n````"
+
+    def shown(output):
+        data = output.get("data", {})
+        if output["output_type"] == "stream":
+            return fenced("text", "".join(output["text"]))
+        if "image/png" in data:
+            return f"![What the lines above draw](data:image/png;base64,{''.join(data['image/png']).replace(chr(10), '')})"
+        if "text/html" in data:
+            return fenced("{raw} html", "".join(data["text/html"]))
+        return fenced("text", "".join(data["text/plain"]))
+
+    parts = []
+    for file in sorted((root / "docs/manual/notebooks").glob("*.ipynb"), key=lambda path: path.name, reverse=True):  # shear first
+        for cell in json.loads(file.read_text())["cells"]:
+            text = "".join(cell["source"])
+            if cell["cell_type"] == "markdown":
+                text = re.sub(r"^#", "##", text, flags=re.M)
+                parts.append(re.sub(r"\]\(([\w-]+\.ipynb)\)", r"](../notebooks/\1)", text))
+            else:
+                parts += [fenced("python", text), *map(shown, cell["outputs"])]
+    return "\n\n".join(parts)
+
+
 def case_row():
     return ("| {py:class}`moraine.Case <moraine.case.Case>` | builds, edits, checks, runs and sweeps a case |\n"
             if "case" in modules()[0] else "")
@@ -241,6 +268,7 @@ makers = {
     "internal": internal,
     "case-row": case_row,
     "gallery": gallery,
+    "notebooks": notebooks,
     "keys": keys,
     "series": series,
     "commands": commands,

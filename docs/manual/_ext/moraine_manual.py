@@ -6,6 +6,7 @@ A page has a line <!-- generated: WHAT --> where one of these goes:
     series           the columns of series.h5
     commands         the commands, with an example each and what `moraine COMMAND --help` prints
     gallery          the figures of the studies, as their reports have them
+    notebooks        those in notebooks/, with what they show
     api, internal    the modules of python/moraine: those for users with their docstrings, the others as a list
 The role {src}`src/dem/law/contact.hpp: grip()` names a file of the sources, and functions or types in it. A file or name that is
 not there is a warning, so that the manual follows the code.
