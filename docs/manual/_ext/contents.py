@@ -123,7 +123,7 @@ def help_of(command):
         text = output_of(sys.executable, "-m", "moraine", command, "--help")
     else:
         text = output_of(program(), command, "--help")
-    return "```text\n" + text.strip().replace(str(root) + "/", "") + "\n```"
+    return "```{code-block} text\n:class: help\n" + text.strip().replace(str(root) + "/", "") + "\n```"
 
 
 # Commands, in the order of the page: what each is for, and an example. One that a version does not have is left out.
