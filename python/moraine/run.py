@@ -182,36 +182,41 @@ class Run:
     # The bed.
 
     @property
-    def bed(self) -> _core.Bed:
-        """Grains and contacts at the present step, as read-only arrays without a copy, which stay as they are when the run goes on.
+    def grains(self) -> _core.Grains:
+        """The grains at the present step, as read-only arrays, which stay as they are when the run goes on.
 
-        Grains stand in memory order: row k is grain bed.ids[k]."""
+        They stand in memory order: row k is grain grains.ids[k]."""
+        return self._run.grains()
+
+    @property
+    def bed(self) -> _core.Bed:
+        """The same with contacts, pressures and pore water, which takes some ten times as long to read."""
         return self._run.bed()
 
     @property
     def ids(self) -> np.ndarray:
         """Of the grains, n: their rows in snapshots"""
-        return self.bed.ids
+        return self.grains.ids
 
     @property
     def radii(self) -> np.ndarray:
         """m, n"""
-        return self.bed.radii
+        return self.grains.radii
 
     @property
     def positions(self) -> np.ndarray:
         """m, n x 3; a grain that has left by a periodic side is not taken back"""
-        return self.bed.positions
+        return self.grains.positions
 
     @property
     def velocities(self) -> np.ndarray:
         """m/s, n x 3, half a step before the positions"""
-        return self.bed.velocities
+        return self.grains.velocities
 
     @property
     def spins(self) -> np.ndarray:
         """rad/s, n x 3, half a step before the positions"""
-        return self.bed.spins
+        return self.grains.spins
 
     @property
     def pressures(self) -> np.ndarray:

@@ -15,15 +15,6 @@ namespace {
 
 PyObject* error_type = nullptr;
 
-// What a remedy is called here.
-std::string in_python(std::string words) {
-  for (const auto& [option, argument] : {std::pair<std::string, std::string>{"--resume", "resume=True"},
-                                         {"--force", "force=True"},
-                                         {"--set ", "set "}})
-    for (std::size_t at; (at = words.find(option)) != words.npos;) words.replace(at, option.size(), argument);
-  return words;
-}
-
 nb::list keys() {
   nb::list rows;
   for (const cases::Key& key : cases::keys()) {
@@ -38,6 +29,14 @@ nb::list keys() {
 
 }  // namespace
 
+std::string in_python(std::string words) {
+  for (const auto& [option, argument] : {std::pair<std::string, std::string>{"--resume", "resume=True"},
+                                         {"--force", "force=True"},
+                                         {"--set ", "set "}})
+    for (std::size_t at; (at = words.find(option)) != words.npos;) words.replace(at, option.size(), argument);
+  return words;
+}
+
 NB_MODULE(_core, m) {
   error_type = PyErr_NewException("moraine.Error", PyExc_RuntimeError, nullptr);
   m.attr("Error") = nb::handle(error_type);
@@ -50,5 +49,6 @@ NB_MODULE(_core, m) {
   });
   m.attr("version") = MORAINE_VERSION;
   m.def("keys", &keys, "The table of the keys of case.toml, a dict for each row.");
+  bind_cases(m);
   bind_run(m);
 }

@@ -21,10 +21,15 @@ namespace {
 template <class T>
 using Array = nb::ndarray<nb::numpy, T>;
 
-// The bed at one step. Arrays are views of it and keep it.
-struct Bed {
+// The grains at one step. Arrays are views of them and keep them.
+struct Grains {
   dem::Scene scene;
   dem::State state;
+};
+using Shared = std::shared_ptr<Grains>;
+
+// With what touches and what fills the pores.
+struct Bed : Grains {
   std::optional<coupling::WaterFields> water;
   std::optional<dem::Loads> known_loads;
   std::vector<double> known_pressure;
@@ -34,7 +39,7 @@ struct Bed {
     return *known_loads;
   }
 };
-using Shared = std::shared_ptr<Bed>;
+using SharedBed = std::shared_ptr<Bed>;
 
 // Of `of`, whose memory stays as long as any view of it. Read only.
 template <class T>
@@ -65,6 +70,14 @@ Array<const double> member(const Shared& bed, const std::vector<S>& list, dem::V
 }
 
 class Run {
+  // What was read before the run went on.
+  void forget_the_past() {
+    const run::Runner& r = runner();
+    const std::tuple now(r.stage_index(), r.step_number(), r.events().size());
+    if (seen_ != now) grains_.reset(), bed_.reset();
+    seen_ = now;
+  }
+
   // Control-C, or what else a signal's handler in Python throws.
   bool interrupted() {
     const nb::gil_scoped_acquire python;
@@ -124,17 +137,23 @@ class Run {
     guarded([&] { runner().set(key, number); });
   }
   // The results are closed, without a checkpoint of its own.
-  void close() { bed_.reset(), runner_.reset(); }
+  void close() { grains_.reset(), bed_.reset(), runner_.reset(); }
 
-  Shared bed() {
-    const run::Runner& r = runner();
-    const bool current = bed_ && stage_of_bed_ == r.stage_index() && bed_->state.step == r.step_number() &&
-                         events_of_bed_ == r.events().size();
-    if (current) return bed_;
-    bed_.reset();
-    const nb::gil_scoped_release other_threads_may_run;
-    bed_ = std::make_shared<Bed>(Bed{r.stage().scene, r.state(), r.water(), {}, {}});
-    stage_of_bed_ = r.stage_index(), events_of_bed_ = r.events().size();
+  Shared grains() {
+    forget_the_past();
+    if (bed_) return bed_;
+    if (!grains_) {
+      const nb::gil_scoped_release other_threads_may_run;
+      grains_ = std::make_shared<Grains>(Grains{runner().stage().scene, runner().grains()});
+    }
+    return grains_;
+  }
+  SharedBed bed() {
+    forget_the_past();
+    if (!bed_) {
+      const nb::gil_scoped_release other_threads_may_run;
+      bed_ = std::make_shared<Bed>(Bed{{runner().stage().scene, runner().state()}, runner().water(), {}, {}});
+    }
     return bed_;
   }
 
@@ -171,8 +190,9 @@ class Run {
 
   std::optional<run::Runner> runner_;
   std::optional<nb::python_error> raised_;
-  Shared bed_;
-  std::size_t stage_of_bed_ = 0, events_of_bed_ = 0;
+  Shared grains_;
+  SharedBed bed_;
+  std::tuple<std::size_t, std::int64_t, std::size_t> seen_;
 };
 
 std::string kind_of(const run::Runner& r) {
@@ -183,11 +203,11 @@ std::string kind_of(const run::Runner& r) {
 }  // namespace
 
 void bind_run(nb::module_& m) {
-  nb::class_<Bed>(m, "Bed",
-                  "The bed at one step. Arrays are read-only views of its memory, without a copy, and stay "
-                  "valid while the\n"
-                  "run goes on. Grains stand in memory order: row k is grain ids[k], and the order may "
-                  "change between steps.")
+  nb::class_<Grains>(m, "Grains",
+                     "The grains at one step. Arrays are read-only views of one copy of them, and stay as "
+                     "they are while the\n"
+                     "run goes on. They stand in memory order: row k is grain ids[k], and the order may "
+                     "change between steps.")
       .def_prop_ro(
           "ids", [](Shared b) { return column(b, b->state.id); }, "row of each grain in the files; n",
           nb::rv_policy::automatic)
@@ -220,44 +240,47 @@ void bind_run(nb::module_& m) {
           },
           "0 free, 1 lower layer, 2 driven layer; n", nb::rv_policy::automatic)
       .def_prop_ro(
+          "box", [](Shared b) { return view(b, &b->scene.box.x, {3}); },
+          "m; sides along x, y, z; z counts where it is periodic", nb::rv_policy::automatic)
+      .def_prop_ro(
+          "top_wall", [](Shared b) { return b->state.wall_z(); }, "m, its height; 0: none",
+          nb::rv_policy::automatic);
+
+  nb::class_<Bed, Grains>(m, "Bed",
+                          "The grains at one step with their contacts and the pore water; see Grains.")
+      .def_prop_ro(
           "pressures",
-          [](Shared b) {
+          [](SharedBed b) {
             if (b->known_pressure.empty()) b->known_pressure = dem::grain_pressure(b->state, b->loads());
             return column(b, b->known_pressure);
           },
           "Pa; n, sum of normal forces on a grain over its surface. Computed when first asked for",
           nb::rv_policy::automatic)
       .def_prop_ro(
-          "contact_i", [](Shared b) { return member(b, b->loads().contacts, &dem::ContactForce::i); },
+          "contact_i", [](SharedBed b) { return member(b, b->loads().contacts, &dem::ContactForce::i); },
           "row of the first grain of each contact; m. Forces are on it", nb::rv_policy::automatic)
       .def_prop_ro(
-          "contact_j", [](Shared b) { return member(b, b->loads().contacts, &dem::ContactForce::j); },
+          "contact_j", [](SharedBed b) { return member(b, b->loads().contacts, &dem::ContactForce::j); },
           "row of the second grain; m", nb::rv_policy::automatic)
       .def_prop_ro(
           "contact_points",
-          [](Shared b) { return member(b, b->loads().contacts, &dem::ContactForce::point); }, "m; m x 3",
+          [](SharedBed b) { return member(b, b->loads().contacts, &dem::ContactForce::point); }, "m; m x 3",
           nb::rv_policy::automatic)
       .def_prop_ro(
           "contact_normal_forces",
-          [](Shared b) { return member(b, b->loads().contacts, &dem::ContactForce::f_n); },
+          [](SharedBed b) { return member(b, b->loads().contacts, &dem::ContactForce::f_n); },
           "N; m x 3. Computed when first asked for, as all of contacts", nb::rv_policy::automatic)
       .def_prop_ro(
           "contact_tangential_forces",
-          [](Shared b) { return member(b, b->loads().contacts, &dem::ContactForce::f_t); }, "N; m x 3",
+          [](SharedBed b) { return member(b, b->loads().contacts, &dem::ContactForce::f_t); }, "N; m x 3",
           nb::rv_policy::automatic)
       .def_prop_ro(
           "contact_overlaps",
-          [](Shared b) { return member(b, b->loads().contacts, &dem::ContactForce::overlap); }, "m; m",
-          nb::rv_policy::automatic)
-      .def_prop_ro(
-          "box", [](Shared b) { return view(b, &b->scene.box.x, {3}); },
-          "m; sides along x, y, z; z counts where it is periodic", nb::rv_policy::automatic)
-      .def_prop_ro(
-          "top_wall", [](Shared b) { return b->state.wall_z(); }, "m, its height; 0: none",
+          [](SharedBed b) { return member(b, b->loads().contacts, &dem::ContactForce::overlap); }, "m; m",
           nb::rv_policy::automatic)
       .def_prop_ro(
           "water_pressures",
-          [](Shared b) -> std::optional<Array<const double>> {
+          [](SharedBed b) -> std::optional<Array<const double>> {
             if (!b->water) return {};
             const auto& n = b->water->grid.n;
             return view(b, b->water->pressure.data(),
@@ -275,6 +298,7 @@ void bind_run(nb::module_& m) {
       .def("checkpoint", &Run::checkpoint)
       .def("set", &Run::set, nb::arg("key"), nb::arg("value"))
       .def("close", &Run::close)
+      .def("grains", &Run::grains)
       .def("bed", &Run::bed)
       .def("latest", &Run::latest)
       .def("events", &Run::events)

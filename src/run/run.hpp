@@ -1,6 +1,7 @@
 // Runs a case: its stages one after the other, with output, checkpoints and restart.
 #pragma once
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -63,7 +64,7 @@ bool stopping();
 void replay_case(const Options& options);
 
 // Prints what run_case would do.
-void check_case(const Options& options);
+void check_case(const Options& options, std::FILE* out = stdout);
 
 // Runs so many steps of one stage (the first unless named), straight from the start of the case and without
 // output, and prints one line of JSON.

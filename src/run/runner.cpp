@@ -139,6 +139,7 @@ double Runner::time() const {
   return was_finished_ ? now_.rows.back().time : now_.start.time + stage_.time(step_);
 }
 
+dem::State Runner::grains() const { return was_finished_ ? now_.state : engine_->grains(); }
 dem::State Runner::state() const { return was_finished_ ? now_.state : engine_->state(); }
 
 std::optional<coupling::WaterFields> Runner::water() const {

@@ -77,6 +77,7 @@ class Runner {
   const cases::Case& what() const { return case_; }
   const Files& files() const { return files_; }
 
+  dem::State grains() const;                           // as Engine::grains()
   dem::State state() const;                            // as Engine::state()
   std::optional<coupling::WaterFields> water() const;  // none: dry
 

@@ -76,6 +76,28 @@ TEST_F(Steered, StepsGiveTheBitsOfOneGo) {
   }
 }
 
+// Without contacts, the same grains.
+TEST_F(Steered, GrainsAreThoseOfTheState) {
+  for (const dem::Backend backend : {dem::Backend::cpu, dem::Backend::reference}) {
+    const fs::path bed = make("bed", small_case());
+    run::Options o = options(bed);
+    o.backend = backend;
+    o.force = true;
+    run::Runner runner(o, cases::load(bed));
+    while (runner.stage_index() < 2) runner.step(1 << 20), runner.begin_stage();
+    runner.step(321);
+    dem::State all = runner.state();
+    const dem::State grains = runner.grains();
+    EXPECT_FALSE(all.contacts.empty());
+    EXPECT_TRUE(grains.contacts.empty() && grains.wall_contacts.empty());
+    EXPECT_TRUE(grains.id == all.id && grains.r == all.r && grains.part_of == all.part_of);
+    EXPECT_TRUE(grains.x == all.x && grains.v == all.v && grains.omega == all.omega &&
+                grains.force == all.force);
+    EXPECT_EQ(grains.wall_z(), all.wall_z());
+    EXPECT_EQ(grains.ledger.slip, all.ledger.slip);
+  }
+}
+
 // The normal stress and the velocity of a bed that shears, twice each.
 void steer(run::Runner& runner) {
   const std::size_t shear = 2;
