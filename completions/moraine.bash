@@ -4,14 +4,14 @@ _moraine() {
   root=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/..
   for ((i = 1; i < COMP_CWORD; ++i)); do
     case ${COMP_WORDS[i]} in
-      run | sweep | check | keys | bench | export | import-sphere | watch | figures | report | reproduce | cases | test)
+      run | replay | sweep | check | keys | bench | export | import-sphere | watch | figures | report | reproduce | cases | docs | test)
         command=${COMP_WORDS[i]}
         break
         ;;
     esac
   done
   case $command in
-    '') words="run sweep check keys bench export import-sphere watch figures report reproduce cases test --help --version --cuda" ;;
+    '') words="run replay sweep check keys bench export import-sphere watch figures report reproduce cases docs test --help --version --cuda" ;;
     run) words="--resume --force --quiet --set --backend --threads --ranks --help" ;;
     sweep) words="--resume --force --quiet --set --at-once --backend --threads --help" ;;
     check) words="--set --backend --threads --help" ;;
@@ -21,12 +21,14 @@ _moraine() {
     report) words="--output --notes --help" ;;
     reproduce) words="--preset --seeds --quick --set --settled --output --cores --gpu --cluster --cluster-options --dry-run --help" ;;
     export) words="--format --output --help" ;;
-    import-sphere | keys | cases) words="--help" ;;
+    keys) words="--format --help" ;;
+    replay) words="--resume --force --quiet --set --backend --threads --help" ;;
+    import-sphere | cases) words="--help" ;;
   esac
   case $previous in
     --backend) words="cpu cuda auto" ;;
     --preset) words="paper standard fast" ;;
-    --format) [[ $command == export ]] && words="csv lammps vtk" || return ;;
+    --format) if [[ $command == export ]]; then words="csv lammps vtk"; elif [[ $command == keys ]]; then words="text json"; else return; fi ;;
     --set | --at-once | --threads | --ranks | --steps | --stage | --interval | --only | --seeds | --cores | --settled) return ;;
   esac
   COMPREPLY=()

@@ -1,4 +1,4 @@
-// moraine: grain-scale till mechanics. Each command reads a case directory; see README.md.
+// moraine: grain-scale till mechanics. Each command reads a case directory; see docs/manual.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -29,8 +29,8 @@ constexpr std::string_view overview_text =
 constexpr std::string_view overview = overview_text.substr(1);  // without the first end of line
 
 // Those of the script ./moraine, see there.
-const std::vector<std::string> launcher_commands = {"watch",     "figures", "report",
-                                                    "reproduce", "cases",   "test"};
+const std::vector<std::string> launcher_commands = {"watch", "figures", "report", "reproduce",
+                                                    "cases", "docs",    "test"};
 
 std::string did_you_mean(const std::string& word, const std::vector<std::string>& known) {
   std::string near = cases::nearest(word, known);
@@ -142,7 +142,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
 
   CLI::App* replay = app.add_subcommand(
-      "replay", "run a case anew with the loads that were changed from outside, in CASE/replay, and compare all bits");
+      "replay",
+      "run a case anew with the loads that were changed from outside, in CASE/replay, and compare all bits");
   takes_case(replay);
   writes_results(replay);
 
@@ -152,6 +153,11 @@ int main(int argc, char** argv) {
   CLI::App* keys = app.add_subcommand("keys", "list all keys of case.toml, or those about something");
   std::vector<std::string> about;
   keys->add_option("WORD", about, "what the key has in its name or meaning; of several words all");
+  std::string keys_format = "text";
+  keys->add_option("--format", keys_format,
+                   "text; or json: all keys and the columns of series.h5, for programs")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str();
 
   CLI::App* bench =
       app.add_subcommand("bench", "time some steps of a case without output; prints one line of JSON");
@@ -208,7 +214,11 @@ int main(int argc, char** argv) {
     if (*sweep) run::sweep_case(options, at_once);
     if (*replay) run::replay_case(options);
     if (*check) run::check_case(options);
-    if (*keys) std::cout << cases::reference(about);
+    if (*keys) {
+      if (keys_format == "json" && !about.empty())
+        throw error("keys ", about[0], " --format json: json has all keys; leave out the word");
+      std::cout << (keys_format == "json" ? cases::reference_as_json() : cases::reference(about));
+    }
     if (*bench) run::bench_case(options, stage, steps);
     if (*exporting) run::export_grains(options.directory, format, target);
     if (*import) cases::import_sphere(file, directory);

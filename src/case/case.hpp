@@ -235,5 +235,7 @@ std::vector<Change> changes(const std::string& resolved_before, const Case& now)
 // The reference of all keys (name, unit, default, meaning), as `moraine keys` prints it; or of those that
 // have each of these words in their name or meaning. Throws Error where there are none.
 std::string reference(const std::vector<std::string>& words = {});
+// The same for programs, with the columns of series.h5: a JSON object with the lists `keys` and `series`.
+std::string reference_as_json();
 
 }  // namespace moraine::cases

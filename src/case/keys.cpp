@@ -432,6 +432,28 @@ const Key* find(const string& name) {
   return k == keys().end() ? nullptr : &*k;
 }
 
+const char* name_of(Key::Type type) {
+  switch (type) {
+    case Type::number:
+      return "number";
+    case Type::integer:
+      return "integer";
+    case Type::boolean:
+      return "boolean";
+    case Type::text:
+      return "text";
+    case Type::choice:
+      return "choice";
+    case Type::path:
+      return "path";
+    case Type::list:
+      return "list";
+    case Type::load:
+      return "load";
+  }
+  return "";
+}
+
 bool is_list_of_tables(const string& table) {
   return table == "stage" || table == "material" || table == "pair";
 }

@@ -34,6 +34,8 @@ struct Key {
   std::string table() const { return name.substr(0, name.find('.') + 1); }  // "contact.", or ""
 };
 
+const char* name_of(Key::Type type);  // "number"
+
 // Whether a file may have many of these tables, each headed by its name in double brackets.
 bool is_list_of_tables(const std::string& table);  // "stage"
 

@@ -15,33 +15,11 @@ namespace {
 
 PyObject* error_type = nullptr;
 
-const char* name_of(cases::Key::Type type) {
-  switch (type) {
-    case cases::Key::Type::number:
-      return "number";
-    case cases::Key::Type::integer:
-      return "integer";
-    case cases::Key::Type::boolean:
-      return "boolean";
-    case cases::Key::Type::text:
-      return "text";
-    case cases::Key::Type::choice:
-      return "choice";
-    case cases::Key::Type::path:
-      return "path";
-    case cases::Key::Type::list:
-      return "list";
-    case cases::Key::Type::load:
-      return "load";
-  }
-  return "";
-}
-
 nb::list keys() {
   nb::list rows;
   for (const cases::Key& key : cases::keys()) {
     nb::dict row;
-    row["name"] = key.name, row["type"] = name_of(key.type), row["unit"] = key.unit;
+    row["name"] = key.name, row["type"] = cases::name_of(key.type), row["unit"] = key.unit;
     row["default"] = key.fallback, row["accepts"] = key.accepts, row["meaning"] = key.meaning;
     row["kinds"] = key.kinds;
     rows.append(row);

@@ -86,7 +86,7 @@ def test_a_job_at_its_time_limit_is_queued_again(play, tmp_path, monkeypatch):
 def test_the_profile_has_what_the_page_names(play):
     yaml = pytest.importorskip("yaml")
     profile = yaml.safe_load((slurm / "config.yaml").read_text())
-    page = (root / "docs/cluster.md").read_text()
+    page = (root / "docs/manual/how-to/cluster.md").read_text()
     for word in ("--time=1-00:00:00", "--mem-per-cpu=2G", "--signal=TERM@120"):
         assert word in profile["cluster"] and f"| `{word}` |" in page
     for key in ("jobs", "restart-times", "latency-wait"):
