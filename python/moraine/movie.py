@@ -21,7 +21,6 @@ from .results import MissingData, Snapshot
 from .style import ink, plt
 
 kPa = 1e3
-dpi = 160  # at which text of the package's figures is easily read on a screen
 
 
 def snapshots(case, name):
@@ -60,8 +59,9 @@ class Picture:
     """A figure of so many pixels with the title of the case, a caption that changes, and a colour bar of pressure."""
 
     def __init__(self, size, title, stage, upper, colours):
-        self.figure = plt.figure(figsize=np.array(size) / dpi, dpi=dpi)
-        self.size, text = size, {"color": ink, "va": "center"}
+        dpi = min(size[0] / 8, size[1] / 6)  # so that 8 x 6 inches have room for text of the size that figures have, whatever the pixels
+        self.inches, text = np.array(size) / dpi, {"color": ink, "va": "center"}
+        self.figure = plt.figure(figsize=self.inches, dpi=dpi)
         self.figure.text(0.02, 0.965, title, fontsize=9, **text)
         self.figure.text(0.02, 0.93, f"stage {stage.name}", fontsize=8, **text)
         self.caption = self.figure.text(0.98, 0.965, "", fontsize=9, ha="right", **text)
@@ -134,14 +134,13 @@ def section(files, size, title, stage):
     scales = force_figures.section_scales(cuts, diameter)
     del cuts
     picture = Picture(size, title, stage, upper, force_figures.warm)
-    room = np.array([0.80, 0.73]) * size / dpi  # inches
-    wide = min(room[0], room[1] * width / max(tops))
-    tall = wide * max(tops) / width
-    place = np.array([0.08 + (0.80 - wide * dpi / size[0]) / 2, 0.09 + (0.73 - tall * dpi / size[1]) / 2, wide * dpi / size[0],
-                      tall * dpi / size[1]])
+    low, room = np.array([0.08, 0.09]), np.array([0.80, 0.74])  # of the picture
+    scale = min(room * picture.inches / [width, max(tops)])  # inches per metre
+    wide, tall = extent = scale * np.array([width, max(tops)]) / picture.inches
+    place = [*(low + (room - extent) / 2), wide, tall]
     axes = picture.figure.add_axes(place)
-    key = picture.figure.add_axes([0.03, 0.885 - 0.18 * dpi / size[1], 0.94, 0.36 * dpi / size[1]])
-    force_figures.section_key(key, width / wide, diameter, **scales)
+    key = picture.figure.add_axes([0.03, 0.885 - 0.18 / picture.inches[1], 0.94, 0.36 / picture.inches[1]])
+    force_figures.section_key(key, 1 / scale, diameter, **scales)
     for file in files:
         axes.clear()
         snapshot = Snapshot(file)
