@@ -14,40 +14,13 @@ import time
 
 import numpy as np
 
-from . import force_figures, results, spheres
+from . import force_figures, frames, results, spheres
 from . import section as sections
 from .progress import readable
 from .results import MissingData, Snapshot
 from .style import ink, plt
 
 kPa = 1e3
-
-
-def snapshots(case, name):
-    """Stage and snapshots to show: of the stage of that name; else of the last that shears; else of the last that has any."""
-    if name is None:
-        have = [s for s in case.stages if any((case.output / "snapshots").glob(f"{s.index + 1:02d}-{s.name}-*.h5"))]
-        if not have:
-            raise MissingData(f"{case.output}/snapshots: there is no snapshot; the key output.snapshot_interval says how often a run writes one")
-        stage = ([s for s in have if s.sheared] or have)[-1]
-    else:
-        stage = case.stage(name)
-    found = stage.snapshots
-    if len(found) < 2:
-        raise MissingData(f"{found[0].file}: is the only snapshot of stage {stage.name}; a movie takes two at least: "
-                          "a shorter output.snapshot_interval gives more")
-    return stage, [s.file for s in found]  # opened one at a time: all of a long run may not fit into memory
-
-
-def captions(stage, files):
-    """Time in the stage, and shear strain where there is one, of each snapshot."""
-    times = [Snapshot(f).stage_time for f in files]
-    texts = [f"t = {t:.3f} s" for t in times]
-    if stage.sheared:
-        rows = stage.series
-        strain = np.interp(times, rows["stage_time"], rows["shear_strain"])
-        texts = [f"{text}    shear strain {s:.3f}" for text, s in zip(texts, strain)]
-    return texts
 
 
 def pressure_scale(pressures):
@@ -152,11 +125,11 @@ def section(files, size, title, stage):
 kinds = {"grains": grains, "section": section}
 
 
-def counted(frames, number, what):
-    """The frames; on a terminal with a line that says how many are done and how long the rest will take."""
+def counted(pictures, number, what):
+    """The pictures; on a terminal with a line that says how many are done and how long the rest will take."""
     began, live = time.monotonic(), sys.stderr.isatty()
-    for k, frame in enumerate(frames):
-        yield frame
+    for k, picture in enumerate(pictures):
+        yield picture
         if live:
             left = (time.monotonic() - began) / (k + 1) * (number - k - 1)
             print(f"\r{what}: frame {k + 1} of {number}  ETA {readable(left)} \033[K", end="", file=sys.stderr, flush=True)
@@ -193,11 +166,11 @@ def encode(images, path, size, fps, title):
 
 def make(case, kind, path, stage=None, fps=10, size=(1280, 960)):
     """Writes a movie of kind "grains" or "section" of a case (moraine.open) to path. Returns the number of frames."""
-    stage, files = snapshots(case, stage)
-    texts, title = captions(stage, files), case.settings.get("title") or case.directory.resolve().name
-    frames = counted(kinds[kind](files, size, title, stage), len(files), kind)
+    stage, files = frames.snapshots(case, stage, 2, "a movie")
+    texts, title = frames.captions(stage, files), frames.title(case)
+    drawn = counted(kinds[kind](files, size, title, stage), len(files), kind)
     try:
-        encode((picture.pixels(text) for picture, text in zip(frames, texts)), path, size, fps, title)
+        encode((picture.pixels(text) for picture, text in zip(drawn, texts)), path, size, fps, title)
     finally:
         plt.close("all")
     return len(files)

@@ -1,0 +1,40 @@
+"""Which snapshots of a case are shown, one after the other, and what is said of each: for the movies and the page in 3D."""
+import numpy as np
+
+from .results import MissingData, Snapshot
+
+
+def snapshots(case, name=None, least=1, what="a page"):
+    """Stage and files of the snapshots to show: of the stage of that name; else of the last that shears; else of the last that has any."""
+    if name is None:
+        have = [s for s in case.stages if any((case.output / "snapshots").glob(f"{s.index + 1:02d}-{s.name}-*.h5"))]
+        if not have:
+            raise MissingData(f"{case.output}/snapshots: there is no snapshot; the key output.snapshot_interval says how often a run writes one")
+        stage = ([s for s in have if s.sheared] or have)[-1]
+    else:
+        stage = case.stage(name)
+    found = stage.snapshots
+    if len(found) < least:
+        raise MissingData(f"{found[0].file}: is the only snapshot of stage {stage.name}; {what} takes {least} at least: "
+                          "a shorter output.snapshot_interval gives more")
+    return stage, [s.file for s in found]  # opened one at a time: all of a long run may not fit into memory
+
+
+def times(stage, files):
+    """Time in the stage, s, and shear strain, of each snapshot; the latter from the series, none where the stage does not shear."""
+    time = np.array([Snapshot(f).stage_time for f in files])
+    if not stage.sheared:
+        return time, None
+    rows = stage.series
+    return time, np.interp(time, rows["stage_time"], rows["shear_strain"])
+
+
+def captions(stage, files):
+    time, strain = times(stage, files)
+    if strain is None:
+        return [f"t = {t:.3f} s" for t in time]
+    return [f"t = {t:.3f} s    shear strain {s:.3f}" for t, s in zip(time, strain)]
+
+
+def title(case):
+    return case.settings.get("title") or case.directory.resolve().name
