@@ -38,3 +38,11 @@ def captions(stage, files):
 
 def title(case):
     return case.settings.get("title") or case.directory.resolve().name
+
+
+def round_up(value):
+    """To the next round number: the upper end of a scale of colours."""
+    if not value > 0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(next(m * power for m in (1, 1.5, 2, 3, 4, 5, 6, 8, 10) if m * power >= value * (1 - 1e-9)))

@@ -25,7 +25,7 @@ kPa = 1e3
 
 def pressure_scale(pressures):
     """A round upper end of the colours, kPa, which few of all grains' pressures are above."""
-    return force_figures.rounded(max(np.percentile(np.concatenate(pressures), 97) / kPa, 1e-3))
+    return frames.round_up(np.percentile(np.concatenate(pressures), 97) / kPa)
 
 
 class Picture:

@@ -15,7 +15,6 @@ import re
 import numpy as np
 
 from . import frames, results
-from .force_figures import rounded
 from .movie import counted
 from .results import MissingData, Snapshot
 from .style import plt, sequential
@@ -95,8 +94,9 @@ def unpacked(columns, text):
 
 def pack(snapshot):
     """What the page shows of a snapshot: Packed, and a dictionary of what else is said of it."""
-    packed, about = Packed(), {"wall": snapshot.top_wall if np.isfinite(snapshot.top_wall) else None}
-    g, c = snapshot.grains, snapshot.contacts
+    packed, g, c = Packed(), snapshot.grains, snapshot.contacts
+    top = float((g["position"][:, 2] + g["radius"]).max())
+    about = {"top": snapshot.top_wall if top < snapshot.top_wall < 1.5 * top else top}  # of the box that is drawn
     for axis in range(3):
         packed.add("xyz"[axis], g["position"][:, axis])
     for name, (*_, values) in fields.items():
@@ -127,7 +127,7 @@ class Range:
 
     def ends(self):
         low, high = min(p[0] for p in self.parts) * self.factor, max(p[1] for p in self.parts) * self.factor
-        high = rounded(high) if high > 0 else 1.0
+        high = frames.round_up(high)
         return (-high, high) if self.signed else (0.0, high)
 
 

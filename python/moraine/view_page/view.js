@@ -43,7 +43,7 @@ async function snapshot(k) {
 
 // ---- scene
 const canvas = $("bed");
-const gl = canvas.getContext("webgl2", {antialias: true});
+const gl = canvas.getContext("webgl2", {antialias: false});
 if (!gl) problem("This browser shows no WebGL 2, which the bed is drawn with.");
 const renderer = new THREE.WebGLRenderer({canvas, context: gl});
 renderer.setClearColor(0xffffff, 1);
@@ -51,9 +51,8 @@ const scene = new THREE.Scene();
 const camera = new THREE.OrthographicCamera(-1, 1, 1, -1, 0, 1);
 camera.up.set(0, 0, 1);
 const controls = new THREE.OrbitControls(camera, canvas);
-const top_ = Math.max(...data.snapshots.map(s => Math.min(s.wall === null ? 0 : s.wall, 3 * Math.max(lx, ly))), 0.2 * lx);
+const top_ = Math.max(...data.snapshots.map(s => s.top));
 const middle = new THREE.Vector3(lx / 2, ly / 2, top_ / 2), reach = Math.hypot(lx, ly, top_);
-let grow = 1;  // height of the window over its width
 
 function home() {
   const a = -28 * Math.PI / 180, e = 22 * Math.PI / 180;  // as in the figures
@@ -82,12 +81,18 @@ vec3 lit(vec3 colour, vec3 normal) {
   return colour * (0.38 + 0.67 * shine) + 0.25 * pow(shine, 24.0);
 }`;
 
-function instanced(corners, attributes, vertex, fragment) {
-  const geometry = new THREE.InstancedBufferGeometry();
-  geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(corners), 3));
-  geometry.setIndex([0, 1, 2, 2, 1, 3]);
-  for (const [name, size, length] of attributes) {
-    const attribute = new THREE.InstancedBufferAttribute(new Float32Array(size * length), size);
+// `count` quads whose corners all have the attributes of their quad: {name: size}. Plain triangles; instances would each be a draw of its
+// own in software.
+function quads(count, attributes, vertex, fragment) {
+  const geometry = new THREE.BufferGeometry(), corner = new Float32Array(12 * count), index = new Uint32Array(6 * count);
+  for (let k = 0; k < count; ++k) {
+    corner.set([-1, -1, 0, 1, -1, 0, -1, 1, 0, 1, 1, 0], 12 * k);
+    index.set([0, 1, 2, 2, 1, 3].map(c => 4 * k + c), 6 * k);
+  }
+  geometry.setAttribute("position", new THREE.BufferAttribute(corner, 3));
+  geometry.setIndex(new THREE.BufferAttribute(index, 1));
+  for (const [name, size] of Object.entries(attributes)) {
+    const attribute = new THREE.BufferAttribute(new Float32Array(4 * size * count), size);
     attribute.usage = 35048;  // dynamic
     geometry.setAttribute(name, attribute);
   }
@@ -99,49 +104,45 @@ function instanced(corners, attributes, vertex, fragment) {
   return mesh;
 }
 
-const grains = instanced([-1, -1, 0, 1, -1, 0, -1, 1, 0, 1, 1, 0], [["at", 3, n], ["radius", 1, n], ["value", 1, n]], `
+const grains = quads(n, {at: 3, radius: 1, value: 1}, `
 attribute vec3 at;
 attribute float radius, value;
-uniform float size;
-varying vec3 centre;
-varying vec2 off;
-varying float r, share;
-void main() {
-  centre = (modelViewMatrix * vec4(at, 1.0)).xyz;
-  off = position.xy;
-  r = radius * size;
-  share = value;
-  gl_Position = projectionMatrix * vec4(centre + vec3(r * off, 0.0), 1.0);
-}`, `
+uniform float size, cut;
+varying vec4 plane;  // of the cut: across it, and how far its place is from the centre, in radii
+varying vec3 colour;
+varying vec2 off, depth;  // depth: of the centre, and of a radius
 uniform sampler2D map;
-uniform mat4 projectionMatrix;
-uniform float cut;
-varying vec3 centre;
-varying vec2 off;
-varying float r, share;
+void main() {
+  vec3 centre = (modelViewMatrix * vec4(at, 1.0)).xyz;
+  off = position.xy;
+  float r = radius * size;
+  colour = value < 0.0 ? vec3(0.72) : texture2D(map, vec2(value, 0.5)).rgb;
+  plane = vec4((viewMatrix * vec4(0.0, 1.0, 0.0, 0.0)).xyz, (cut - at.y) / r);
+  gl_Position = projectionMatrix * vec4(centre + vec3(r * off, 0.0), 1.0);
+  depth = 0.5 * projectionMatrix[2][2] * vec2(centre.z, r) + vec2(0.5 + 0.5 * projectionMatrix[3][2], 0.0);
+  if (at.y + r < cut) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);  // out of sight
+}`, `
+varying vec4 plane;
+varying vec3 colour;
+varying vec2 off, depth;
 ${light}
 void main() {
   float w2 = 1.0 - dot(off, off);
   if (w2 < 0.0) discard;
   vec3 normal = vec3(off, sqrt(w2));
-  vec3 across = (viewMatrix * vec4(0.0, 1.0, 0.0, 0.0)).xyz, origin = (viewMatrix * vec4(0.0, cut, 0.0, 1.0)).xyz;
-  float kept = dot(across, centre + r * normal - origin);
-  vec3 place = centre + r * normal;
-  bool flat_ = false;
-  if (kept < 0.0) {  // what lies before the cut; the ray may go on to a disc in it
-    if (across.z > -1e-4) discard;
-    float t = (dot(across, origin - centre) / r - dot(across.xy, off)) / across.z;
-    if (abs(t) > normal.z) discard;
-    place = centre + r * vec3(off, t);
-    flat_ = true;
+  float w = normal.z;  // where the ray meets the grain, in radii from its centre towards the eye
+  bool cut_ = dot(plane.xyz, normal) < plane.w;
+  if (cut_) {  // what lies before the cut; the ray may go on to a disc in it
+    if (plane.z > -1e-4) discard;
+    w = (plane.w - dot(plane.xy, off)) / plane.z;
+    if (abs(w) > normal.z) discard;
   }
-  vec3 colour = share < 0.0 ? vec3(0.72) : texture2D(map, vec2(share, 0.5)).rgb;
-  gl_FragColor = vec4(flat_ ? colour : lit(colour, normal), 1.0);
-  gl_FragDepthEXT = 0.5 + 0.5 * (projectionMatrix[2][2] * place.z + projectionMatrix[3][2]);
+  gl_FragColor = vec4(cut_ ? colour : lit(colour, normal), 1.0);
+  gl_FragDepthEXT = depth.x + depth.y * w;
 }`);
 
 const most = Math.max(1, ...data.snapshots.map(s => s.columns.find(c => c[0] == "i")[1]));
-const chains = instanced([-1, 0, 0, 1, 0, 0, -1, 1, 0, 1, 1, 0], [["a", 3, most], ["b", 3, most], ["thick", 1, most], ["value", 1, most]], `
+const chains = quads(most, {a: 3, b: 3, thick: 1, value: 1}, `
 attribute vec3 a, b;
 attribute float thick, value;
 varying float across, share, y;
@@ -151,8 +152,9 @@ void main() {
   vec2 side = vec2(-along.y, along.x) / max(length(along), 1e-9);
   across = position.x;
   share = value;
-  y = mix(a.y, b.y, position.y);
-  gl_Position = projectionMatrix * vec4(mix(p, q, position.y) + vec3(thick * across * side, 0.0), 1.0);
+  float end = 0.5 + 0.5 * position.y;
+  y = mix(a.y, b.y, end);
+  gl_Position = projectionMatrix * vec4(mix(p, q, end) + vec3(thick * across * side, 0.0), 1.0);
 }`, `
 uniform sampler2D map;
 uniform float cut;
@@ -167,7 +169,7 @@ void main() {
 let slice = null;
 if (data.water) {
   const material = new THREE.MeshBasicMaterial({side: THREE.DoubleSide, transparent: true, opacity: 0.75});
-  slice = new THREE.Mesh(new THREE.PlaneBufferGeometry(1, 1), material);
+  slice = new THREE.Mesh(new (THREE.PlaneBufferGeometry || THREE.PlaneGeometry)(1, 1), material);
   slice.rotation.x = Math.PI / 2;
   scene.add(slice);
 }
@@ -182,7 +184,7 @@ function outline(height) {
 
 // ---- what the inputs ask for
 const number = id => parseFloat($(id).value);
-const text = v => Math.abs(v) >= 1e4 || v && Math.abs(v) < 1e-3 ? v.toExponential(1) : String(+v.toPrecision(4));
+const text = v => Math.abs(v) >= 1e6 || v && Math.abs(v) < 1e-3 ? v.toExponential(1) : String(+v.toPrecision(3));
 let now = null, shown = -1;
 
 function paint(canvas, map) {
@@ -198,44 +200,38 @@ function bar(id, field, low, high) {
   $(id ? id + "-label" : "label").textContent = field.label + (field.unit ? ` (${field.unit})` : "");
 }
 
-function set(mesh, name, fill, count) {
-  const attribute = mesh.geometry.getAttribute(name);
-  fill(attribute.array);
+// Gives quad k of the mesh, at all its corners, the numbers that of(k) returns.
+function set(mesh, name, count, of) {
+  const attribute = mesh.geometry.getAttribute(name), size = attribute.itemSize;
+  for (let k = 0; k < count; ++k) {
+    const values = of(k);
+    for (let c = 0; c < 4; ++c) for (let m = 0; m < size; ++m) attribute.array[(4 * k + c) * size + m] = values[m];
+  }
   attribute.needsUpdate = true;
-  if (count !== undefined) mesh.geometry.instanceCount = mesh.geometry.maxInstancedCount = count;  // by version of three.js
 }
 
 function recolour() {
   const field = data.fields[$("colour").value], low = number("low"), high = number("high"), grey = $("fixed").checked && $("colour").value != "role";
   uniforms.map.value = maps[field.signed ? "signed" : "plain"];
   const values = now[$("colour").value];
-  set(grains, "value", out => {
-    for (let k = 0; k < n; ++k)
-      out[k] = grey && now.role[k] > 0 ? -1 : Math.min(1, Math.max(0, (values[k] * field.factor - low) / (high - low || 1)));
-  });
+  set(grains, "value", n, k => [grey && now.role[k] > 0 ? -1 : Math.min(1, Math.max(0, (values[k] * field.factor - low) / (high - low || 1)))]);
   bar("", field, low, high);
 }
 
 function rechain() {
   const mean = data.snapshots[shown].mean_force, least = number("force") * mean;
-  const [a, b, thick, value] = ["a", "b", "thick", "value"].map(name => chains.geometry.getAttribute(name));
-  const r = now.radius.reduce((s, v) => s + v, 0) / n;
-  let count = 0;
-  if ($("chains").checked) for (let k = 0; k < now.force.length; ++k) {
-    if (now.force[k] < least) continue;
-    const i = now.i[k], j = now.j[k];
-    let dx = now.x[j] - now.x[i], dy = now.y[j] - now.y[i];
-    dx -= lx * Math.round(dx / lx);  // across periodic sides
-    dy -= ly * Math.round(dy / ly);
-    a.array.set([now.x[i], now.y[i], now.z[i]], 3 * count);
-    b.array.set([now.x[i] + dx, now.y[i] + dy, now.z[j]], 3 * count);
-    thick.array[count] = 0.11 * r * Math.sqrt(now.force[k] / mean);
-    value.array[count] = Math.min(1, now.force[k] / mean / 6);
-    ++count;
-  }
-  for (const attribute of [a, b, thick, value]) attribute.needsUpdate = true;
-  chains.geometry.instanceCount = chains.geometry.maxInstancedCount = count;
+  const r = now.radius.reduce((s, v) => s + v, 0) / n, strong = [];
+  if ($("chains").checked) for (let k = 0; k < now.force.length; ++k) if (now.force[k] >= least) strong.push(k);
+  const count = strong.length, i = k => now.i[strong[k]], j = k => now.j[strong[k]];
+  const beyond = (from, to, side) => to - side * Math.round((to - from) / side);  // the image nearest across periodic sides
+  set(chains, "a", count, k => [now.x[i(k)], now.y[i(k)], now.z[i(k)]]);
+  set(chains, "b", count, k => [beyond(now.x[i(k)], now.x[j(k)], lx), beyond(now.y[i(k)], now.y[j(k)], ly), now.z[j(k)]]);
+  set(chains, "thick", count, k => [0.11 * r * Math.sqrt(now.force[strong[k]] / mean)]);
+  set(chains, "value", count, k => [Math.min(1, now.force[strong[k]] / mean / 6)]);
+  chains.geometry.setDrawRange(0, 6 * count);
   chains.visible = count > 0;
+  $("chain-note").textContent = `${count} of ${data.snapshots[shown].contacts} contacts; light to dark: 0 to ${text(6 * mean)} N, six times the mean.`;
+  $("chain-note").style.display = $("chains").checked ? "" : "none";
   return count;
 }
 
@@ -267,11 +263,11 @@ async function show(k) {
   if (mine != asked) return;  // another has been asked for meanwhile
   now = found;
   shown = k;
-  set(grains, "at", out => { for (let m = 0; m < n; ++m) { out[3 * m] = now.x[m]; out[3 * m + 1] = now.y[m]; out[3 * m + 2] = now.z[m]; } }, n);
-  set(grains, "radius", out => out.set(now.radius));
-  const about = data.snapshots[k], wall = about.wall;
-  outline(wall !== null && wall < 3 * Math.max(lx, ly) ? wall : now.z.reduce((m, v) => Math.max(m, v), 0) + now.radius[0]);
-  $("caption").textContent = `stage ${data.stage}    t = ${about.time.toFixed(3)} s` + (about.strain === null ? "" : `    shear strain ${about.strain.toFixed(3)}`);
+  set(grains, "at", n, m => [now.x[m], now.y[m], now.z[m]]);
+  set(grains, "radius", n, m => [now.radius[m]]);
+  const about = data.snapshots[k];
+  outline(about.top);
+  $("caption").textContent = `stage ${data.stage}, t = ${about.time.toFixed(3)} s` + (about.strain === null ? "" : `, shear strain ${about.strain.toFixed(3)}`);
   $("grain").style.display = "none";
   refresh();
   mark();
@@ -296,8 +292,8 @@ function refresh() {
   draw();
 }
 
-// ---- drawing: at once while things move, and sharper when they rest
-let waits = false, resting = 0;
+// ---- drawing: at once while things move, more coarsely where that takes long, and sharper when they rest
+let waits = false, resting = 0, moving = window.devicePixelRatio, still = Math.max(2, moving);  // pixels of the canvas for one of the page
 function paintBed(ratio) {
   renderer.setPixelRatio(ratio);
   const main = canvas.parentElement;
@@ -309,20 +305,22 @@ function draw() {
   waits = true;
   requestAnimationFrame(() => {
     waits = false;
-    paintBed(window.devicePixelRatio);
+    paintBed(moving);
     clearTimeout(resting);
-    resting = setTimeout(() => paintBed(Math.max(2, window.devicePixelRatio)), 250);
+    resting = setTimeout(() => paintBed(still), 250);
   });
 }
 function resize() {
   const main = canvas.parentElement;
-  grow = main.clientHeight / Math.max(1, main.clientWidth);
-  const half = 0.62 * Math.max(1.15 * Math.hypot(lx, ly) / 2 * Math.max(grow, 0.01), (top_ + 0.42 * Math.hypot(lx, ly)) / 2) * 1.15;
+  const grow = Math.max(main.clientHeight, 1) / Math.max(main.clientWidth, 1);  // height over width
+  const across = 0.88 * lx + 0.47 * ly, high = 0.93 * top_ + 0.37 * across;  // of the bed as home() sees it
+  const half = Math.max(0.54 * across * grow, 0.66 * high);  // with room for what stands above and below
   camera.top = half;
   camera.bottom = -half;
-  camera.right = half / Math.max(grow, 0.01);
+  camera.right = half / grow;
   camera.left = -camera.right;
   camera.updateProjectionMatrix();
+  paintBed(moving);  // before the browser shows the new size
   draw();
 }
 new ResizeObserver(resize).observe(canvas.parentElement);
@@ -412,13 +410,15 @@ window.addEventListener("keydown", e => {
 });
 
 // Frames a second of turning the bed, each one waited for.
-window.measure = (frames = 20) => {
-  const pixel = new Uint8Array(4), began = performance.now(), from = camera.position.clone();
-  for (let k = 0; k < frames; ++k) {
+window.measure = (frames = 10, ratio = window.devicePixelRatio) => {
+  const pixel = new Uint8Array(4), from = camera.position.clone();
+  let began = 0;
+  for (let k = 0; k <= frames; ++k) {  // the first is not counted: shaders are compiled in it
     camera.position.sub(middle).applyAxisAngle(camera.up, 0.02).add(middle);
     camera.lookAt(middle);
-    paintBed(window.devicePixelRatio);
+    paintBed(ratio);
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+    began = began || performance.now();
   }
   const rate = 1000 * frames / (performance.now() - began);
   camera.position.copy(from);
@@ -426,6 +426,11 @@ window.measure = (frames = 20) => {
   draw();
   return rate;
 };
+function adapt() {
+  const full = window.devicePixelRatio, rate = measure(1);
+  moving = full * Math.min(1, Math.max(0.25, Math.sqrt(rate / 20)));
+  still = moving < full ? full : Math.max(2, full);
+}
 
 // ---- begin
 for (const [name, field] of Object.entries(data.fields)) $("colour").add(new Option(field.label, name));
@@ -455,5 +460,5 @@ for (const id of inputs) $(id).addEventListener($(id).type == "range" || $(id).t
 $("home").addEventListener("click", home);
 home();
 plot();
-show(number("t"));
+show(number("t")).then(adapt);
 })();
