@@ -137,7 +137,7 @@ def drawn_curves(stage):
     every = -(-len(rows) // most_rows)
     which = sorted({*range(0, len(rows), every), len(rows) - 1})
     def numbers(name, factor=1):
-        return [float(f"{v:.5g}") if np.isfinite(v) else None for v in factor * rows[name][which]]
+        return [float(f"{v:.7g}") if np.isfinite(v) else None for v in factor * rows[name][which]]
     x = {"time (s)": numbers("stage_time")} | ({"shear strain": numbers("shear_strain")} if stage.sheared else {})
     shown = {label: numbers(name, 1e-3 if "kPa" in label else 1) for name, label in curves.items()
              if name in rows and np.ptp(np.nan_to_num(rows[name])) > 0 and not (name == "total_friction" and not stage.wet)}

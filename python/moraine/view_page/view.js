@@ -174,13 +174,11 @@ if (data.water) {
   scene.add(slice);
 }
 
+const edges = [], corner = k => [k & 1, k >> 1 & 1, k >> 2 & 1];  // of a unit cube
+for (let k = 0; k < 8; ++k) for (const bit of [1, 2, 4]) if (!(k & bit)) edges.push(...corner(k), ...corner(k | bit));
 const box = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({color: 0x555555}));
+box.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(edges), 3));
 scene.add(box);
-function outline(height) {
-  const corner = k => [k & 1 ? lx : 0, k & 2 ? ly : 0, k & 4 ? height : 0], ends = [];
-  for (let k = 0; k < 8; ++k) for (const bit of [1, 2, 4]) if (!(k & bit)) ends.push(...corner(k), ...corner(k | bit));
-  box.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(ends), 3));
-}
 
 // ---- what the inputs ask for
 const number = id => parseFloat($(id).value);
@@ -266,7 +264,7 @@ async function show(k) {
   set(grains, "at", n, m => [now.x[m], now.y[m], now.z[m]]);
   set(grains, "radius", n, m => [now.radius[m]]);
   const about = data.snapshots[k];
-  outline(about.top);
+  box.scale.set(lx, ly, about.top);
   $("caption").textContent = `stage ${data.stage}, t = ${about.time.toFixed(3)} s` + (about.strain === null ? "" : `, shear strain ${about.strain.toFixed(3)}`);
   $("grain").style.display = "none";
   refresh();
