@@ -40,6 +40,16 @@ def title(case):
     return case.settings.get("title") or case.directory.resolve().name
 
 
+def free_for(path, mark, what):
+    """Raises MissingData where a file of another kind is at the path: it is not overwritten. mark: what is in the first bytes of `what`."""
+    if path.is_dir():
+        raise MissingData(f"{path}: is a directory; expected the name of a file")
+    if path.exists():
+        with path.open("rb") as file:
+            if mark not in file.read(1000):
+                raise MissingData(f"{path}: is there already, and is no {what}; move it, or give another --output")
+
+
 def round_up(value):
     """To the next round number: the upper end of a scale of colours."""
     if not value > 0:

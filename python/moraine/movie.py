@@ -166,6 +166,7 @@ def encode(images, path, size, fps, title):
 
 def make(case, kind, path, stage=None, fps=10, size=(1280, 960)):
     """Writes a movie of kind "grains" or "section" of a case (moraine.open) to path. Returns the number of frames."""
+    frames.free_for(path, b"ftyp", "MP4")
     stage, files = frames.snapshots(case, stage, 2, "a movie")
     texts, title = frames.captions(stage, files), frames.title(case)
     drawn = counted(kinds[kind](files, size, title, stage), len(files), kind)

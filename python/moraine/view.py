@@ -204,6 +204,7 @@ def html(head, texts):
 
 def make(case, path, stage=None, every=None, most=50.0):
     """Writes the page to path, aside and then renamed. Returns what the page says of the case."""
+    frames.free_for(path, b'content="moraine view"', "page that moraine view has written")
     library()  # before the work
     head, texts = collect(case, stage, every, most)
     aside = path.with_name(f".{path.name}.{os.getpid()}")

@@ -70,11 +70,18 @@ def test_a_failure_of_ffmpeg_leaves_the_movie_of_before(case, tmp_path, monkeypa
     fake.write_text("#!/bin/sh\nfor last; do :; done\necho half >\"$last\"\necho 'No space left on device' >&2\nexit 1\n")
     fake.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}:/usr/bin:/bin")
-    (tmp_path / "grains.mp4").write_text("of before")
+    (tmp_path / "grains.mp4").write_text("    ftyp of before")
     with pytest.raises(MissingData, match="grains.mp4: ffmpeg failed: No space left on device"):
         movie.make(open_case(case.directory), "grains", tmp_path / "grains.mp4", size=(320, 240))
-    assert (tmp_path / "grains.mp4").read_text() == "of before"
+    assert (tmp_path / "grains.mp4").read_text() == "    ftyp of before"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bin", "grains.mp4"]
+
+
+def test_other_files_are_not_overwritten(case, tmp_path):
+    (tmp_path / "grains.mp4").write_text("notes")
+    with pytest.raises(MissingData, match="grains.mp4: is there already, and is no MP4; move it, or give another --output"):
+        movie.make(open_case(case.directory), "grains", tmp_path / "grains.mp4")
+    assert (tmp_path / "grains.mp4").read_text() == "notes"
 
 
 def test_what_is_missing_is_said(case, tmp_path, capsys, monkeypatch):

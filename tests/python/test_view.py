@@ -126,6 +126,10 @@ def test_what_is_missing_is_said(case, tmp_path, capsys, monkeypatch):
     assert not (without / "figures/view.html").exists()
     with pytest.raises(MissingData, match="not finite"):
         view.Packed().add("pressure", [1.0, np.nan])
+    for place, why in ((case.directory / "case.toml", "is no page that moraine view has written"), (tmp_path, "is a directory")):
+        assert main(["view", str(case.directory), "--output", str(place)]) == 1
+        assert why in capsys.readouterr().err
+    assert (case.directory / "case.toml").read_text().startswith("title")
     monkeypatch.setattr(view.Path, "is_file", lambda self: False)
     monkeypatch.setattr(view.importlib.util, "find_spec", lambda name: None)
     assert main(["view", str(case.directory)]) == 1
