@@ -140,6 +140,11 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0, 4096))
       ->capture_default_str();
 
+  CLI::App* replay = app.add_subcommand(
+      "replay", "run a case anew with the loads that were changed from outside, in CASE/replay, and compare all bits");
+  takes_case(replay);
+  writes_results(replay);
+
   CLI::App* check = app.add_subcommand("check", "check a case and print what would run");
   takes_case(check);
 
@@ -200,6 +205,7 @@ int main(int argc, char** argv) {
           "sweep: runs whole cases side by side in one process; start it without mpirun, or run one case on ",
           ranks->size(), " ranks");
     if (*sweep) run::sweep_case(options, at_once);
+    if (*replay) run::replay_case(options);
     if (*check) run::check_case(options);
     if (*keys) std::cout << cases::reference(about);
     if (*bench) run::bench_case(options, stage, steps);

@@ -3,12 +3,20 @@
 `moraine.Case` is where to begin, `moraine.open(DIRECTORY)` opens results that are there.
 """
 import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # for editors; they are loaded on demand
+    from .case import Case
+    from .results import Results, Snapshot, Stage, Table, open
+    from .run import Error, Run
+    from .sealed import MissingData
+    from .sweep import Sweep
 
 __version__ = "0.1.0"
 
 _home = {  # module of each public name; on demand, as some need no NumPy, and only some the compiled part
     "Results": "results", "MissingData": "sealed", "Snapshot": "results", "Stage": "results", "Table": "results", "open": "results",
-    "Run": "run", "Error": "run",
+    "Case": "case", "Sweep": "sweep", "Run": "run", "Error": "run",
 }
 __all__ = list(_home)
 

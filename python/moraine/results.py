@@ -220,6 +220,13 @@ class Results:
         length = min((len(c) for c in table.columns.values()), default=0)  # a row may be on its way
         return table.rows(slice(length))
 
+    def refresh(self):
+        """Forgets what has been read, of a case that goes on: the next look at series and snapshots has what there is then. Returns self."""
+        for one in (self, *self.stages):
+            for read_once in ("series", "snapshots"):
+                vars(one).pop(read_once, None)
+        return self
+
     def stage(self, which):
         """By name, or the last of a kind: stage("shear")."""
         for fits in (lambda s: s.name == which, lambda s: s.kind == which):

@@ -212,11 +212,9 @@ void check_stage(const Entries& entries, const Entries& above, const Context& co
   const string kind = context.kind;
 
   for (const Key& key : keys()) {
-    if (!is_stage_key(key) || key.kinds.empty()) continue;
-    const auto kinds = split(key.kinds, ", ");
-    if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end())
-      s.expect(entries.at(key.name).value == default_value(key, entries, context), key.name,
-               "none: it belongs to kind ", key.kinds, ", and this stage is ", kind);
+    if (!is_stage_key(key)) continue;
+    if (const string why = not_of_kind(key, kind); !why.empty())
+      s.expect(entries.at(key.name).value == default_value(key, entries, context), key.name, why);
   }
 
   const bool by_strain = s.number("stage.strain") != 0;
@@ -389,8 +387,7 @@ string one_line(const string& text) {
   return line;
 }
 
-Case load_checked(const fs::path& directory, const std::vector<Override>& overrides) {
-  Draft draft = read(directory, overrides);
+Case checked_case(const fs::path& directory, Draft draft) {
   apply_preset(draft);
   const string file = (directory / "case.toml").string();
   Case c{};
@@ -449,10 +446,36 @@ bool Case::presses() const {
 
 Case load(const fs::path& directory, const std::vector<Override>& overrides) {
   try {
-    return load_checked(directory, overrides);
+    return checked_case(directory, read(directory, overrides));
   } catch (const Error& e) {
     throw Error(one_line(e.what()));
   }
+}
+
+string filled(const fs::path& directory, const string& text) {
+  try {
+    Draft draft = read(directory, {}, &text);
+    apply_preset(draft);
+    const Context above{&draft.entries, (directory / "case.toml").string() + ": ", "", ""};
+    for (const Key& key : keys())
+      if (!is_listed(key)) add_default(key, draft.entries, above);
+    string kind_before;
+    for (StageDraft& s : draft.stages) {
+      Context context{&draft.entries, s.stated + ".", "", kind_before};
+      if (const auto kind = s.entries.find("stage.kind"); kind != s.entries.end())
+        context.kind = std::get<string>(kind->second.value);
+      kind_before = context.kind;
+      for (const Key& key : keys())
+        if (is_stage_key(key)) add_default(key, s.entries, context);
+    }
+    return text_of(draft);
+  } catch (const Error& e) {
+    throw Error(one_line(e.what()));
+  }
+}
+
+Case load_resolved(const fs::path& directory, const string& text) {
+  return checked_case(directory, read_resolved_case(directory, text));
 }
 
 std::vector<Change> changes(const string& resolved_before, const Case& now) {

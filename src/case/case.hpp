@@ -212,6 +212,14 @@ struct Override {
 // Throws Error naming file, line, key, value, what was expected and the nearest known key.
 Case load(const std::filesystem::path& directory, const std::vector<Override>& overrides = {});
 
+// What this text would be as the case.toml of that directory, with what it extends, its preset and all
+// defaults, in SI. Each value is checked by itself, but not what depends on several: the case may be
+// unfinished.
+std::string filled(const std::filesystem::path& directory, const std::string& text);
+
+// A case as it was resolved (Case::resolved), of this directory.
+Case load_resolved(const std::filesystem::path& directory, const std::string& text);
+
 // A case.toml for another directory that is this case with these overrides; `base` leads from there back
 // here.
 std::string extension_text(const std::filesystem::path& directory, const std::vector<Override>& overrides,

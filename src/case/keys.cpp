@@ -443,6 +443,12 @@ string word_of(const Key& key) {
 
 string or_word(const Key& key) { return word_of(key).empty() ? "" : ", or " + quoted(word_of(key)); }
 
+string not_of_kind(const Key& key, const string& kind) {
+  const auto kinds = split(key.kinds, ", ");
+  if (key.kinds.empty() || std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) return "";
+  return "none: it belongs to kind " + key.kinds + ", and this stage is " + kind;
+}
+
 void check_range(const Key& key, const Value& value) {
   if (key.type == Type::choice) {
     const auto choices = split(key.accepts, " | ");
@@ -473,8 +479,13 @@ string suggestion(const string& unknown_key, const string& shown) {
   }
   if (const string near = nearest(unknown, siblings); !near.empty())
     return "did you mean " + (shown.empty() ? table : shown) + near + "?";
-  if (siblings.empty()) {
-    const string near = nearest(unknown_key, others);
+  if (siblings.empty() || table.empty()) {
+    // Of a name that lacks its table, what another table has that is near.
+    string near = nearest(unknown_key, others);
+    std::size_t least = unknown.size();
+    for (const string& other : others)
+      if (table.empty() && !nearest(unknown, {leaf(other)}).empty())
+        if (const auto d = edit_distance(unknown, leaf(other)); d < least) least = d, near = other;
     return near.empty() ? "`moraine keys` lists all" : "did you mean " + near + "?";
   }
   return "known here: " + join(siblings, ", ");

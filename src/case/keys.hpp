@@ -46,6 +46,9 @@ const Key* find(const std::string& name);  // null: no such key
 std::string word_of(const Key& key);
 std::string or_word(const Key& key);  // for errors: `, or "auto"`
 
+// "none: it belongs to kind shear, and this stage is settle"; empty where stages of that kind have the key.
+std::string not_of_kind(const Key& key, const std::string& kind);
+
 // Throws Error with what was expected.
 void check_range(const Key& key, const Value& value);
 

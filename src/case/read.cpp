@@ -200,13 +200,24 @@ void select_stages(Draft& draft) {
 
 class File {
  public:
-  File(const fs::path& directory, const fs::path& root) : directory_(directory), root_(root) {
-    if (!fs::is_regular_file(path()))
+  // text: in place of what the file holds.
+  File(const fs::path& directory, const fs::path& root, const string* text = nullptr)
+      : directory_(directory), root_(root) {
+    if (!text && !fs::is_regular_file(path()))
       throw error(path().string(), ": not found; a case is a directory that holds a case.toml");
     try {
-      table_ = toml::parse_file(path().string());
+      table_ = text ? toml::parse(*text) : toml::parse_file(path().string());
     } catch (const toml::parse_error& e) {
       throw error(path().string(), ":", e.source().begin.line, ": ", e.description());
+    }
+  }
+
+  // A resolved case of that directory.
+  File(const fs::path& directory, const string& text) : directory_(directory), root_(directory) {
+    try {
+      table_ = toml::parse(text);
+    } catch (const toml::parse_error& e) {
+      throw error("the resolved case: line ", e.source().begin.line, ": ", e.description());
     }
   }
 
@@ -329,8 +340,9 @@ class File {
 };
 
 // `chain` holds the cases that led here.
-Draft read_file(const fs::path& directory, const fs::path& root, std::vector<fs::path> chain) {
-  const File file(directory, root);
+Draft read_file(const fs::path& directory, const fs::path& root, std::vector<fs::path> chain,
+                const string* text = nullptr) {
+  const File file(directory, root, text);
   Draft draft;
   chain.push_back(fs::weakly_canonical(directory));
   if (const auto [base, stated] = file.extends(); !base.empty()) {
@@ -396,8 +408,8 @@ void set(Draft& draft, const string& full_name, const Override& o) {
 
 }  // namespace
 
-Draft read(const fs::path& directory, const std::vector<Override>& overrides) {
-  Draft draft = read_file(directory, directory, {});
+Draft read(const fs::path& directory, const std::vector<Override>& overrides, const string* text) {
+  Draft draft = read_file(directory, directory, {}, text);
   // In whatever order they are given: what names a stage goes before what is meant for each.
   const auto set_all = [&](bool of_stages, bool of_each) {
     std::map<string, const Override*> by;
@@ -414,6 +426,12 @@ Draft read(const fs::path& directory, const std::vector<Override>& overrides) {
   set_all(false, false);
   select_stages(draft);
   set_all(true, true), set_all(true, false);
+  return draft;
+}
+
+Draft read_resolved_case(const fs::path& directory, const string& text) {
+  Draft draft;
+  File(directory, text).merge_into(draft);
   return draft;
 }
 
@@ -444,6 +462,26 @@ std::map<string, string> read_resolved(const string& text) {
     }
   values["stages"] = join(stages, ", ");
   return values;
+}
+
+Value read_value(const string& name, const string& toml, const string& kind) {
+  toml::table one;
+  try {
+    one = toml::parse("value = " + toml);
+  } catch (const toml::parse_error& e) {
+    throw error(name, " = ", toml, ": ", e.description());
+  }
+  const toml::node& node = *one.get("value");
+  const string stated = name + " = " + text_of(node), table = split(name, ".")[0];
+  const std::size_t dot = name.rfind('.');
+  const bool listed = dot != name.npos && is_list_of_tables(table);
+  const string key_name = listed ? table + name.substr(dot) : name;
+  const Key* key = find(key_name);
+  if (!key)
+    throw error(stated, ": unknown key; ", suggestion(key_name, listed ? name.substr(0, dot + 1) : ""));
+  if (const string why = not_of_kind(*key, kind); !kind.empty() && !why.empty())
+    throw error(stated, ": expected ", why);
+  return about(stated, [&] { return checked(*key, node); });
 }
 
 Value parse_default(const Key& key, const string& toml) { return parse_bare(key, toml); }

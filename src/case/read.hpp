@@ -33,8 +33,15 @@ struct Draft {
   }
 };
 
-// Throws Error, see case.hpp.
-Draft read(const std::filesystem::path& directory, const std::vector<Override>& overrides);
+// Throws Error, see case.hpp. text: what is to be the case.toml of that directory, in place of the file.
+Draft read(const std::filesystem::path& directory, const std::vector<Override>& overrides,
+           const std::string* text = nullptr);
+
+// One value as TOML, as if it stood in case.toml. name: "contact.k_n", "stage.shear.strain"; kind: of the
+// stage, or empty. Throws Error with that name: "contact.k_n = -1.0: expected > 0 N/m".
+Value read_value(const std::string& name, const std::string& toml, const std::string& kind = "");
+
+Draft read_resolved_case(const std::filesystem::path& directory, const std::string& text);
 
 // All keys of a resolved case, by full name ("stage.shear.f"), as they stand there, and its "stages".
 std::map<std::string, std::string> read_resolved(const std::string& text);

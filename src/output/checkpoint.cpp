@@ -18,7 +18,7 @@ inline constexpr bool hdf5::all_doubles<Row> = true;
 namespace {
 
 constexpr const char* kind = "checkpoint";
-constexpr std::int64_t format = 10;  // raise it with every change to a struct below
+constexpr std::int64_t format = 11;  // raise it with every change to a struct below
 
 // Every member of every stored struct, once, for writing and for reading. A new member is one more line; one
 // that is forgotten does not compile.
@@ -205,6 +205,14 @@ constexpr std::tuple members<coupling::WaterState>{
 };
 
 template <>
+constexpr std::tuple members<LoadEvent>{
+    Member{"stage", &LoadEvent::stage},
+    Member{"step", &LoadEvent::step},
+    Member{"key", &LoadEvent::key},
+    Member{"value", &LoadEvent::value},
+};
+
+template <>
 constexpr std::tuple members<StageStart>{
     Member{"time", &StageStart::time},
     Member{"step", &StageStart::step},
@@ -237,6 +245,7 @@ constexpr std::tuple members<Checkpoint>{
     Member{"water", &Checkpoint::water},
     Member{"rows", &Checkpoint::rows},
     Member{"snapshots", &Checkpoint::snapshots},
+    Member{"events", &Checkpoint::events},
 };
 
 // The largest value of an enumeration; those stored start from 0.

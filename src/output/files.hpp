@@ -130,6 +130,14 @@ Snapshot read_snapshot(const std::filesystem::path& path);
 // bed.xdmf, grains and grid together. Rewritten whole; of snapshots of one time it lists the last.
 void write_xdmf(const std::filesystem::path& directory, const std::vector<SnapshotInfo>& snapshots);
 
+// A load that was changed from outside (src/run/events.hpp).
+struct LoadEvent {
+  std::int64_t stage, step;  // index; of the scene's clock
+  std::string key;           // of a stage: "normal_stress"
+  double value;              // SI, from this step on
+  bool operator==(const LoadEvent&) const = default;
+};
+
 // checkpoint.h5: all that is needed to go on with the same bits, the series so far included.
 struct Checkpoint {
   std::string case_text;  // resolved case
@@ -151,6 +159,7 @@ struct Checkpoint {
   coupling::WaterState water;
   std::vector<Row> rows;
   std::vector<SnapshotInfo> snapshots;
+  std::vector<LoadEvent> events;  // so far
 };
 // What stood there before is kept as BEFORE, where that is given. Between two renames PATH is missing for a
 // moment.

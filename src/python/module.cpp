@@ -3,6 +3,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "bindings.hpp"
 #include "case/case.hpp"
 #include "case/keys.hpp"
 #include "error.hpp"
@@ -12,16 +13,26 @@ using namespace moraine;
 
 namespace {
 
+PyObject* error_type = nullptr;
+
 const char* name_of(cases::Key::Type type) {
   switch (type) {
-    case cases::Key::Type::number: return "number";
-    case cases::Key::Type::integer: return "integer";
-    case cases::Key::Type::boolean: return "boolean";
-    case cases::Key::Type::text: return "text";
-    case cases::Key::Type::choice: return "choice";
-    case cases::Key::Type::path: return "path";
-    case cases::Key::Type::list: return "list";
-    case cases::Key::Type::load: return "load";
+    case cases::Key::Type::number:
+      return "number";
+    case cases::Key::Type::integer:
+      return "integer";
+    case cases::Key::Type::boolean:
+      return "boolean";
+    case cases::Key::Type::text:
+      return "text";
+    case cases::Key::Type::choice:
+      return "choice";
+    case cases::Key::Type::path:
+      return "path";
+    case cases::Key::Type::list:
+      return "list";
+    case cases::Key::Type::load:
+      return "load";
   }
   return "";
 }
@@ -40,8 +51,26 @@ nb::list keys() {
 
 }  // namespace
 
+std::string in_python(std::string words) {
+  for (const auto& [option, argument] : {std::pair<std::string, std::string>{"--resume", "resume=True"},
+                                         {"--force", "force=True"},
+                                         {"--set ", "set "}})
+    for (std::size_t at; (at = words.find(option)) != words.npos;) words.replace(at, option.size(), argument);
+  return words;
+}
+
 NB_MODULE(_core, m) {
-  nb::exception<Error>(m, "Error");
+  error_type = PyErr_NewException("moraine.Error", PyExc_RuntimeError, nullptr);
+  m.attr("Error") = nb::handle(error_type);
+  nb::register_exception_translator([](const std::exception_ptr& thrown, void*) {
+    try {
+      std::rethrow_exception(thrown);
+    } catch (const Error& e) {
+      PyErr_SetString(error_type, in_python(e.what()).c_str());
+    }
+  });
   m.attr("version") = MORAINE_VERSION;
   m.def("keys", &keys, "The table of the keys of case.toml, a dict for each row.");
+  bind_cases(m);
+  bind_run(m);
 }

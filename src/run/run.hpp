@@ -1,6 +1,7 @@
 // Runs a case: its stages one after the other, with output, checkpoints and restart.
 #pragma once
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -27,7 +28,11 @@ struct Options {
   int threads = 0;         // of each rank; 0: all
   Ranks* ranks = nullptr;  // that share the bed; this is rank 0. null: there are no others
   bool resume = false, force = false, quiet = false;
-  Ordering ordering;  // another gives other bits: for tests
+  Ordering ordering;                      // another gives other bits: for tests
+  std::filesystem::path output;           // where results go; empty: directory/output
+  std::vector<output::LoadEvent> events;  // of a run that begins: loads change at their steps
+  bool drop_events = false;               // of a run that goes on: those after its checkpoint do not count
+  std::function<bool()> stop;             // asked every now and then; true: a checkpoint, and Interrupted
   // Told every now and then: so many steps of so many of that stage are done.
   std::function<void(std::size_t stage, std::int64_t step, std::int64_t steps)> on_progress;
 };
@@ -54,8 +59,12 @@ std::string changed_physics(const std::string& resolved_before, const cases::Cas
 void catch_signals();
 bool stopping();
 
+// Runs a case anew in CASE/replay, with the events of its checkpoint, as far as that has come. Throws Error
+// where not all bits come out the same.
+void replay_case(const Options& options);
+
 // Prints what run_case would do.
-void check_case(const Options& options);
+void check_case(const Options& options, std::FILE* out = stdout);
 
 // Runs so many steps of one stage (the first unless named), straight from the start of the case and without
 // output, and prints one line of JSON.

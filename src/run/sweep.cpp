@@ -53,8 +53,8 @@ using State = Job::State;
 
 class Sweep {
  public:
-  Sweep(const Options& options, int at_once)
-      : directory_(options.directory / "sweep"), screen_(options.quiet) {
+  Sweep(const Options& options, int at_once, SweepListener listener)
+      : directory_(options.directory / "sweep"), listener_(std::move(listener)) {
     Plan plan = plan_sweep(options.overrides);
     columns_ = std::move(plan.columns), understood_ = std::move(plan.understood);
     const bool gpu = options.backend == dem::Backend::cuda ||
@@ -72,6 +72,7 @@ class Sweep {
       job.options.overrides.clear();  // they stand in its case.toml
       job.options.threads = std::max(1, threads / at_once_);
       job.options.quiet = true;
+      job.options.stop = [this] { return asked_to_stop_.load(); };
       job.plan = std::move(planned);
       expect_no_results(job.options);
     }
@@ -87,13 +88,35 @@ class Sweep {
   }
 
   void run() {
-    screen_.say(std::to_string(jobs_.size()) + " cases, " + std::to_string(at_once_) + " at once, in " +
-                directory_.string() + ": " + understood_);
+    listener_.say(std::to_string(jobs_.size()) + " cases, " + std::to_string(at_once_) + " at once, in " +
+                  directory_.string() + ": " + understood_);
     std::vector<std::thread> workers;
     for (int k = 0; k < at_once_; ++k) workers.emplace_back([this] { work(); });
     watch();
     for (std::thread& worker : workers) worker.join();
-    report();
+    write_summary();
+  }
+
+  std::vector<SweptCase> cases() const {
+    std::vector<SweptCase> list;
+    for (const Job& job : jobs_)
+      list.push_back(
+          {job.plan.name, job.options.directory, job.plan.values, state_name(job.state), job.message});
+    return list;
+  }
+
+  // The table of strengths; throws Error where cases are missing.
+  void report() const {
+    std::cout << table_ << "of the last shear stage; also in " << (directory_ / "summary.csv").string()
+              << "\n";
+    std::string stopped, not_begun;
+    for (const Job& job : jobs_) {
+      if (job.state == State::failed) stopped += "\n  " + job.plan.name + ": " + job.message;
+      if (job.state == State::waiting) not_begun += "\n  " + job.plan.name + ": not begun";
+    }
+    if (const int missing = static_cast<int>(jobs_.size()) - count(State::finished))
+      throw error(missing, " of ", jobs_.size(),
+                  " cases did not finish (--resume goes on with them):", stopped, not_begun);
   }
 
  private:
@@ -162,7 +185,7 @@ class Sweep {
 
   Job* take() {
     const std::lock_guard lock(mutex_);
-    if (stopping()) return nullptr;
+    if (to_stop()) return nullptr;
     const auto job =
         std::find_if(jobs_.begin(), jobs_.end(), [](const Job& j) { return j.state == State::waiting; });
     if (job == jobs_.end()) return nullptr;
@@ -183,21 +206,25 @@ class Sweep {
     const auto began = std::chrono::steady_clock::now();
     std::unique_lock lock(mutex_);
     const auto going_on = [&] {
-      return count(State::running) > 0 || (count(State::waiting) > 0 && !stopping());
+      return count(State::running) > 0 || (count(State::waiting) > 0 && !to_stop());
     };
     while (going_on() || !news_.empty()) {
       changed_.wait_for(lock, 200ms);
       for (; !news_.empty(); news_.pop_front()) {
         const Job& job = *news_.front();
-        screen_.say(job.state == State::failed ? "stopped: " + job.plan.name + ": " + job.message
-                    : job.result.was_finished  ? "finished already: " + job.plan.name
-                                               : "finished: " + job.plan.name);
+        listener_.say(job.state == State::failed ? "stopped: " + job.plan.name + ": " + job.message
+                      : job.result.was_finished  ? "finished already: " + job.plan.name
+                                                 : "finished: " + job.plan.name);
       }
-      if (screen_.due()) screen_.show(progress(seconds_since(began)));
+      const auto [done, line] = progress(seconds_since(began));
+      lock.unlock();  // cases may end meanwhile
+      listener_.show(done, line);
+      if (listener_.stop && listener_.stop()) asked_to_stop_ = true;
+      lock.lock();
     }
   }
 
-  std::string progress(double seconds) const {
+  std::pair<double, std::string> progress(double seconds) const {
     double done = 0, before = 0, all = 0;
     for (const Job& job : jobs_) {
       done += job.done, all += job.work;
@@ -208,7 +235,13 @@ class Sweep {
     std::snprintf(text, sizeof text, "%d running, %d of %zu finished, %d stopped  %5.1f %%  ETA %s",
                   count(State::running), count(State::finished), jobs_.size(), count(State::failed),
                   100 * done / all, left > 0 ? readable_time(left).c_str() : "unknown");
-    return text;
+    return {done / all, text};
+  }
+
+  bool to_stop() const { return stopping() || asked_to_stop_; }
+
+  static std::string state_name(State state) {
+    return state == State::finished ? "finished" : state == State::waiting ? "not begun" : "stopped";
   }
 
   int count(State state) const {
@@ -216,20 +249,19 @@ class Sweep {
         std::count_if(jobs_.begin(), jobs_.end(), [&](const Job& j) { return j.state == state; }));
   }
 
-  void report() const {
+  void write_summary() {
     std::size_t width = 4;
     for (const Job& job : jobs_) width = std::max(width, job.plan.name.size());
     const auto in_width = [&](std::string name) { return name.append(width + 2 - name.size(), ' '); };
-    std::string table = in_width("case") + "friction: peak  smoothed  ultimate  dilation/diameters\n";
+    table_ = in_width("case") + "friction: peak  smoothed  ultimate  dilation/diameters\n";
     std::string csv = "case,";
     for (const std::string& column : columns_) csv += column + ",";
     csv += "state,peak,peak_strain,smoothed_peak,ultimate,dilation_diameters\n";
 
-    std::string stopped, not_begun;
     for (const Job& job : jobs_) {
       const bool finished = job.state == State::finished;
       const auto s = finished ? final_strength(job.what.stages, job.result.rows) : std::optional<Strength>{};
-      const std::string state = finished ? "finished" : job.state == State::waiting ? "not begun" : "stopped";
+      const std::string state = state_name(job.state);
       char line[160] = "", numbers[160] = ",,,,";
       if (s) {
         std::snprintf(line, sizeof line, "%14.4f%10.4f%10.4f%+14.4f", s->peak, s->smoothed_peak, s->ultimate,
@@ -237,25 +269,20 @@ class Sweep {
         std::snprintf(numbers, sizeof numbers, "%.9g,%.9g,%.9g,%.9g,%.9g", s->peak, s->peak_strain,
                       s->smoothed_peak, s->ultimate, s->dilation_diameters);
       }
-      table += in_width(job.plan.name) + (s ? line : finished ? "no shear stage" : state) + "\n";
+      table_ += in_width(job.plan.name) + (s ? line : finished ? "no shear stage" : state) + "\n";
       csv += job.plan.name + ",";
       for (const std::string& value : job.plan.values) csv += value + ",";
       csv += state + "," + numbers + "\n";
-      if (job.state == State::failed) stopped += "\n  " + job.plan.name + ": " + job.message;
-      if (job.state == State::waiting) not_begun += "\n  " + job.plan.name + ": not begun";
     }
     output::write_text(directory_ / "summary.csv", csv);
-    std::cout << table << "of the last shear stage; also in " << (directory_ / "summary.csv").string()
-              << "\n";
-    if (const int missing = static_cast<int>(jobs_.size()) - count(State::finished))
-      throw error(missing, " of ", jobs_.size(),
-                  " cases did not finish (--resume goes on with them):", stopped, not_begun);
   }
 
   fs::path directory_;
   std::vector<std::string> columns_;
   std::string understood_;
-  Screen screen_;
+  SweepListener listener_;
+  std::string table_;
+  std::atomic<bool> asked_to_stop_ = false;
   int at_once_ = 1;
   std::deque<Job> jobs_;
 
@@ -268,7 +295,21 @@ class Sweep {
 
 void sweep_case(const Options& options, int at_once) {
   catch_signals();
-  Sweep(options, at_once).run();
+  Screen screen(options.quiet);
+  SweepListener listener;
+  listener.say = [&](const std::string& line) { screen.say(line); };
+  listener.show = [&](double, const std::string& line) {
+    if (screen.due()) screen.show(line);
+  };
+  Sweep sweep(options, at_once, listener);
+  sweep.run();
+  sweep.report();
+}
+
+std::vector<SweptCase> sweep(const Options& options, int at_once, const SweepListener& listener) {
+  Sweep sweep(options, at_once, listener);
+  sweep.run();
+  return sweep.cases();
 }
 
 }  // namespace moraine::run

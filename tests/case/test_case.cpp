@@ -555,5 +555,37 @@ TEST_F(CaseTest, relations_between_keys) {
             "amplitude");
 }
 
+TEST_F(CaseTest, one_value_is_judged_as_one_of_a_file) {
+  const auto fault_in = [](const std::string& name, const std::string& toml, const std::string& kind = "") {
+    try {
+      read_value(name, toml, kind);
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string("no error");
+  };
+  EXPECT_EQ(std::get<double>(read_value("stage.shear.normal_stress", "\"80 kPa\"", "shear")), 80e3);
+  EXPECT_EQ(fault_in("contact.k_n", "-1"), "contact.k_n = -1: expected > 0 N/m");
+  EXPECT_EQ(fault_in("title", "3"), "title = 3: expected a text in quotes");
+  EXPECT_EQ(fault_in("stage.shear.strian", "1"),
+            "stage.shear.strian = 1: unknown key; did you mean stage.shear.strain?");
+  EXPECT_EQ(fault_in("normal_stres", "1"),
+            "normal_stres = 1: unknown key; did you mean stage.normal_stress?");
+  EXPECT_EQ(fault_in("stage.fall.velocity", "1", "settle"),
+            "stage.fall.velocity = 1: expected none: it belongs to kind shear, and this stage is settle");
+  EXPECT_NE(fault_in("contact.k_n", "1 2"), "no error");
+}
+
+TEST_F(CaseTest, a_text_is_filled_with_presets_and_defaults_though_it_is_unfinished) {
+  write("[contact]\nmu_s = 0.4\n", "base");
+  const std::string text =
+      "extends = \"../base\"\n[model]\npreset = \"fast\"\n[[stage]]\nname = \"a\"\nkind = \"settle\"\n";
+  const auto values = read_resolved(filled(files.path() / "x", text));  // no such directory
+  EXPECT_EQ(values.at("contact.mu_d"), "0.4");
+  EXPECT_EQ(values.at("stage.a.f"), "0.3");
+  EXPECT_EQ(values.at("stage.a.wall_gamma_n"), "450.0");
+  EXPECT_EQ(values.at("stage.a.duration"), "0.0");  // which load() would refuse
+}
+
 }  // namespace
 }  // namespace moraine::cases

@@ -143,7 +143,7 @@ void PairEngine::advance(std::int64_t steps) {
   }
 }
 
-State PairEngine::state() const {
+State PairEngine::read(bool contacts) const {
   State s = kept_;
   BodyMotion bodies = control_.bodies;
   if (!control_.closed) {
@@ -154,6 +154,15 @@ State PairEngine::state() const {
   }
   const GrainRow* const grain = bed_.grain.data();
   reserve(s, bed_.n, bed_.water.size());
+  for (std::int64_t i = 0; i < bed_.water.size(); ++i) s.water_force.push_back(bed_.water.data()[i].f);
+  for (Index i = 0; i < bed_.n; ++i) append_grain(s, grain[i], bed_.load.data()[i], bed_.part_of.data()[i]);
+  if (contacts) append_contacts(s, bodies);
+  finish_state(s, bodies);
+  return s;
+}
+
+void PairEngine::append_contacts(State& s, const BodyMotion& bodies) const {
+  const GrainRow* const grain = bed_.grain.data();
   std::size_t near = 0, at_planes = 0;  // contacts at most
   for (const Chunk& chunk : bed_.chunks) {
     for (const auto& candidates : chunk.candidates)
@@ -163,8 +172,6 @@ State PairEngine::state() const {
     at_planes += chunk.planes.size();
   }
   s.contacts.reserve(near), s.wall_contacts.reserve(at_planes);
-  for (std::int64_t i = 0; i < bed_.water.size(); ++i) s.water_force.push_back(bed_.water.data()[i].f);
-  for (Index i = 0; i < bed_.n; ++i) append_grain(s, grain[i], bed_.load.data()[i], bed_.part_of.data()[i]);
   for (const Chunk& chunk : bed_.chunks) {
     for (int part = 0; part < 2; ++part)
       for (const Candidate& c : chunk.candidates[part])
@@ -175,8 +182,6 @@ State PairEngine::state() const {
     for (const PlanePair& p : chunk.planes)
       append_wall_contact(s, bed_.scene, bodies.plane[p.plane], grain[p.i], p.i, p.spring);
   }
-  finish_state(s, bodies);
-  return s;
 }
 
 Engine::Counts PairEngine::counts() const {

@@ -21,7 +21,6 @@ class PairEngine final : public Engine {
     control_.bodies.redrive(bed_.scene);
   }
   void advance(std::int64_t steps) override;
-  State state() const override;
   Counts counts() const override;
   std::string describe() const override;
   int threads() const override { return threads_; }
@@ -38,10 +37,14 @@ class PairEngine final : public Engine {
   // In pairs, of each rank at the last search.
   const std::vector<double>& work() const { return traffic_->work(); }
 
+ protected:
+  State read(bool contacts) const override;
+
  private:
   void deal(int threads);
   void search();
   void start(const Scene& scene);
+  void append_contacts(State& s, const BodyMotion& bodies) const;
 
   const int threads_wanted_;  // 0: by the number of grains
   int threads_;               // at most

@@ -111,7 +111,12 @@ class GatherEngine final : public Engine {
     }
   }
 
-  State state() const override {
+  Counts counts() const override { return {lists_.total / 2, lists_.total / 2, searches_}; }
+  std::string describe() const override { return name_; }
+  int threads() const override { return 1; }
+
+ private:
+  State read(bool contacts) const override {
     State s = kept_;
     s.part_of.clear();
     const Control control = space_.read(control_.data());
@@ -127,7 +132,12 @@ class GatherEngine final : public Engine {
       bodies.ledger.add(TallyLayout::dissipation(total));
     }
     for (Index i = 0; i < n_; ++i) append_grain(s, grains[i], loads[i], kept_.part_of[i]);
+    if (contacts) append_contacts(s, grains, bodies);
+    finish_state(s, bodies);
+    return s;
+  }
 
+  void append_contacts(State& s, const std::vector<GrainRow>& grains, const BodyMotion& bodies) const {
     const std::vector<std::int64_t> row = lists_.row.get();
     const std::vector<Index> neighbour = lists_.neighbour.get();
     const std::vector<SpringRow> spring = spring_.get(), plane_spring = plane_spring_.get();
@@ -141,15 +151,8 @@ class GatherEngine final : public Engine {
         append_wall_contact(s, view_.scene, bodies.plane[p], grains[i], i,
                             plane_spring[static_cast<std::size_t>(bodies.planes) * i + p]);
     }
-    finish_state(s, bodies);
-    return s;
   }
 
-  Counts counts() const override { return {lists_.total / 2, lists_.total / 2, searches_}; }
-  std::string describe() const override { return name_; }
-  int threads() const override { return 1; }
-
- private:
   void load_rows(const State& s, const BodyMotion& bodies) {
     part_of_.set(s.part_of);
     std::vector<LoadRow> loads(n_);

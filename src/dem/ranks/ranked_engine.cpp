@@ -96,7 +96,7 @@ class RankedEngine final : public Engine {
     together([&] { part_.engine().advance(steps); });
     share_anew();
   }
-  State state() const override {
+  State read(bool) const override {
     State s;
     together([&] {
       tell(ranks_, Order::state);

@@ -1,0 +1,34 @@
+"""The notebooks of the manual run from top to bottom, in an empty folder. A minute or two each."""
+import os
+import sys
+
+import pytest
+
+from conftest import root
+
+pytest.importorskip("moraine._core", reason="moraine._core is not built here (pip install .)")
+nbformat = pytest.importorskip("nbformat")
+nbclient = pytest.importorskip("nbclient")
+for module in ("ipykernel", "pandas", "tomlkit", "matplotlib_inline"):
+    pytest.importorskip(module)
+
+notebooks = sorted((root / "docs/manual/notebooks").glob("*.ipynb"))
+
+
+@pytest.mark.parametrize("file", notebooks, ids=lambda file: file.stem)
+def test_it_runs_and_says_nothing_unasked(file, tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
+    notebook = nbformat.read(file, as_version=4)
+    nbformat.validate(notebook)
+    kept = {k: sorted(o.output_type for o in cell.outputs) for k, cell in enumerate(notebook.cells) if cell.cell_type == "code"}
+    nbclient.NotebookClient(notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}).execute()
+    for k, cell in enumerate(notebook.cells):
+        if cell.cell_type == "code":
+            said = [o.text for o in cell.outputs if o.output_type == "stream" and o.name == "stderr"]
+            assert not said, f"cell {k}: {said}"
+            assert sorted(o.output_type for o in cell.outputs) == kept[k], f"cell {k}: shows something else than the file"
+    assert list(tmp_path.iterdir()), "it writes its cases where it runs"
+
+
+def test_there_are_notebooks():
+    assert len(notebooks) == 2
