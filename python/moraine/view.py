@@ -240,4 +240,6 @@ def run(args):
     path = Path(args.output or case.directory / "figures/view.html")
     path.parent.mkdir(parents=True, exist_ok=True)
     head = make(case, path, args.stage, args.every, args.most)
-    print(f"{path}: {len(head['snapshots'])} snapshots of {head['count']} grains, {path.stat().st_size / 1e6:.2g} MB; left out: {head['left_out']}")
+    number = len(head["snapshots"])
+    print(f"{path}: {number} snapshot{'s' * (number != 1)} of {head['count']} grains, {path.stat().st_size / 1e6:.2g} MB; "
+          f"left out: {head['left_out']}")

@@ -224,7 +224,7 @@ function rechain() {
   const beyond = (from, to, side) => to - side * Math.round((to - from) / side);  // the image nearest across periodic sides
   set(chains, "a", count, k => [now.x[i(k)], now.y[i(k)], now.z[i(k)]]);
   set(chains, "b", count, k => [beyond(now.x[i(k)], now.x[j(k)], lx), beyond(now.y[i(k)], now.y[j(k)], ly), now.z[j(k)]]);
-  set(chains, "thick", count, k => [0.11 * r * Math.sqrt(now.force[strong[k]] / mean)]);
+  set(chains, "thick", count, k => [Math.min(0.5, 0.11 * Math.sqrt(now.force[strong[k]] / mean)) * r]);
   set(chains, "value", count, k => [Math.min(1, now.force[strong[k]] / mean / 6)]);
   chains.geometry.setDrawRange(0, 6 * count);
   chains.visible = count > 0;
