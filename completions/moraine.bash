@@ -4,20 +4,22 @@ _moraine() {
   root=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/..
   for ((i = 1; i < COMP_CWORD; ++i)); do
     case ${COMP_WORDS[i]} in
-      run | replay | sweep | check | keys | bench | export | import-sphere | watch | figures | report | reproduce | cases | docs | test)
+      run | replay | sweep | check | keys | bench | export | import-sphere | watch | figures | movie | view | report | reproduce | cases | docs | test)
         command=${COMP_WORDS[i]}
         break
         ;;
     esac
   done
   case $command in
-    '') words="run replay sweep check keys bench export import-sphere watch figures report reproduce cases docs test --help --version --cuda" ;;
+    '') words="run replay sweep check keys bench export import-sphere watch figures movie view report reproduce cases docs test --help --version --cuda" ;;
     run) words="--resume --force --quiet --set --backend --threads --ranks --help" ;;
     sweep) words="--resume --force --quiet --set --at-once --backend --threads --help" ;;
     check) words="--set --backend --threads --help" ;;
     bench) words="--steps --stage --set --backend --threads --ranks --help" ;;
     watch) words="--interval --once --time --png --no-png --help" ;;
     figures) words="--output --format --only --help" ;;
+    movie) words="--only --stage --fps --size --output --help" ;;
+    view) words="--stage --every --most --output --help" ;;
     report) words="--output --notes --help" ;;
     reproduce) words="--preset --seeds --quick --set --settled --output --cores --gpu --cluster --cluster-options --dry-run --help" ;;
     export) words="--format --output --help" ;;
@@ -28,11 +30,12 @@ _moraine() {
   case $previous in
     --backend) words="cpu cuda auto" ;;
     --preset) words="paper standard fast" ;;
+    --only) if [[ $command == movie ]]; then words="grains section"; else return; fi ;;
     --format) if [[ $command == export ]]; then words="csv lammps vtk"; elif [[ $command == keys ]]; then words="text json"; else return; fi ;;
-    --set | --at-once | --threads | --ranks | --steps | --stage | --interval | --only | --seeds | --cores | --settled) return ;;
+    --set | --at-once | --threads | --ranks | --steps | --stage | --interval | --fps | --size | --every | --most | --seeds | --cores | --settled) return ;;
   esac
   COMPREPLY=()
-  if [[ ! $command || $word == -* || $previous == @(--backend|--preset|--format) ]]; then
+  if [[ ! $command || $word == -* || $previous == @(--backend|--preset|--format|--only) ]]; then
     mapfile -t COMPREPLY < <(compgen -W "$words" -S ' ' -- "$word")
   elif [[ $command == @(import-sphere|cases) || $previous == @(--png|--output|--notes) ]]; then
     compopt -o filenames +o nospace
@@ -42,7 +45,7 @@ _moraine() {
       d=${d%/study.toml} d=${d##*/}
       [[ $d == '*' || $d != "$word"* ]] || COMPREPLY+=("$d ")
     done
-  elif [[ $command == @(run|sweep|check|bench|export|watch|figures|report) ]]; then  # directories with a case in them, and those on the way there
+  elif [[ $command == @(run|sweep|check|bench|export|watch|figures|movie|view|report) ]]; then  # directories with a case in them, and those on the way there
     while read -r d; do
       if [[ -e $d/case.toml ]]; then
         COMPREPLY+=("$d ")

@@ -29,8 +29,8 @@ constexpr std::string_view overview_text =
 constexpr std::string_view overview = overview_text.substr(1);  // without the first end of line
 
 // Those of the script ./moraine, see there.
-const std::vector<std::string> launcher_commands = {"watch", "figures", "report", "reproduce",
-                                                    "cases", "docs",    "test"};
+const std::vector<std::string> launcher_commands = {"watch",     "figures", "movie", "view", "report",
+                                                    "reproduce", "cases",   "docs",  "test"};
 
 std::string did_you_mean(const std::string& word, const std::vector<std::string>& known) {
   std::string near = cases::nearest(word, known);

@@ -15,6 +15,8 @@ from . import places
 commands = {  # name: (module, what it does)
     "watch": ("watch", "follow a running case: friction, dilation and energy as they grow"),
     "figures": ("figures", "draw the paper's figures of one case, or of several beside each other"),
+    "movie": ("movie", "make movies of a case: grain pressures in 3D, and a section with spins and slip"),
+    "view": ("view", "write a page that shows the bed in 3D: any field, force chains, water, through time"),
     "report": ("report", "measure the runs of a study and hold them against what was published"),
     "reproduce": ("reproduce", "run a study that is described in cases/, and draw its figures and report"),
     "cases": ("example_cases", "copy the cases that come with the package, to run and to change them"),

@@ -187,6 +187,18 @@ def force_distribution(snapshots, labels, sigma_0, factor=4):
     return figure
 
 
+def section_scales(cuts, diameter):
+    """What the arrows of these sections are drawn to, one for all of them."""
+    def typical(values, percent):
+        values = np.concatenate(values)
+        return rounded(max(np.percentile(values, percent), 1e-9)) if len(values) else 1.0
+
+    return {"speed": typical([np.linalg.norm(c.velocity, axis=1) for c in cuts], 95),  # m/s
+            "slip": typical([np.linalg.norm(c.slip, axis=1) for c in cuts], 95),       # m/s
+            "turn": rounded(2.5 / typical([np.abs(c.spin) for c in cuts], 85)),        # s
+            "length": 1.2 * diameter}                                                  # m, of an arrow of the key
+
+
 def section(snapshots, sigma_0, y=None, z_range=None, labels=None, upper=4):
     """Grains in a vertical plane at several times (Fig. 10): pressure, velocity, spin about y, and slip at contacts.
 
@@ -199,15 +211,7 @@ def section(snapshots, sigma_0, y=None, z_range=None, labels=None, upper=4):
     cuts = [sections.section(s, y, z_range) for s in snapshots]
     labels = labels or [f"t = {s.stage_time:.2f} s" for s in snapshots]
 
-    def typical(values, percent):
-        values = np.concatenate(values)
-        return rounded(max(np.percentile(values, percent), 1e-9)) if len(values) else 1.0
-
-    scales = {"speed": typical([np.linalg.norm(c.velocity, axis=1) for c in cuts], 95),  # m/s
-              "slip": typical([np.linalg.norm(c.slip, axis=1) for c in cuts], 95),       # m/s
-              "turn": rounded(2.5 / typical([np.abs(c.spin) for c in cuts], 85)),        # s
-              "length": 1.2 * diameter}                                                  # m, of an arrow of the key
-
+    scales = section_scales(cuts, diameter)
     width, low, high = cuts[0].width, z_range[0] - 0.6 * diameter, z_range[1] + 0.6 * diameter
     rows, columns = (len(cuts), 1) if width > 1.5 * (high - low) else (1, len(cuts))
     left, right, gap = 0.5, 0.65, 0.3  # inches
@@ -268,7 +272,7 @@ def draw_section(axes, cut, sigma_0, upper, diameter, speed, slip, turn, length)
 
 def section_key(axes, metre_per_inch, diameter, speed, slip, turn, length):
     """What the marks of a section mean, to the scale of its panels."""
-    wide, tall = axes.get_position().width * page * metre_per_inch, 0.36 * metre_per_inch
+    wide, tall = np.array([axes.get_position().width * axes.figure.get_figwidth(), 0.36]) * metre_per_inch
     axes.set(xlim=(0, wide), ylim=(-tall / 2, tall / 2))
     axes.set_axis_off()
     r, gap = min(diameter / 2, 0.45 * tall), 0.08 * metre_per_inch

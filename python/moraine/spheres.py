@@ -26,57 +26,73 @@ def blurred(image, width):
     return image
 
 
-def render(x, r, colour, azimuth=-28, elevation=22, pixels=1100, frame=None):
-    """Centres x (n x 3) and radii r, m, with colours (n x 3 or 4), seen from azimuth and elevation (degrees).
+class View:
+    """Parallel rays from azimuth and elevation (degrees), on a picture that just holds the spheres x, r (m).
 
-    pixels: width of the picture before two by two become one. frame: centres and radii that it is to hold, if others than x and r.
-    Returns an RGBA image, and a function from places (m) to its pixels."""
-    a, e = np.radians([azimuth, elevation])
-    right = np.array([np.cos(a), np.sin(a), 0])
-    back = np.array([-np.sin(a) * np.cos(e), np.cos(a) * np.cos(e), -np.sin(e)])
-    up = np.cross(right, back)
+    pixels: its width before two by two become one. at_most: its width and height in pixels of the final picture, instead."""
+
+    def __init__(self, x, r, azimuth=-28, elevation=22, pixels=1100, at_most=None):
+        a, e = np.radians([azimuth, elevation])
+        self.right = np.array([np.cos(a), np.sin(a), 0])
+        self.back = np.array([-np.sin(a) * np.cos(e), np.cos(a) * np.cos(e), -np.sin(e)])
+        self.up = np.cross(self.right, self.back)
+        self.low = np.array([min(x @ self.right - r), min(x @ self.up - r)])
+        high = np.array([max(x @ self.right + r), max(x @ self.up + r)])
+        room = (pixels, np.inf) if at_most is None else 2 * np.array(at_most) - 2
+        self.scale = min(room / (high - self.low))  # pixels per metre, before two by two become one
+        self.width, self.height = (np.ceil((high - self.low) * self.scale).astype(int) + 1) // 2 * 2
+
+    def place(self, point):
+        """The pixel of the final picture where a place (m) is seen."""
+        return (point @ self.right - self.low[0]) * self.scale / 2, self.height // 2 - (point @ self.up - self.low[1]) * self.scale / 2
+
+
+def draw(x, r, colour, view):
+    """Centres x (n x 3) and radii r, m, with colours (n x 3 or 4), as an RGBA image of half the view's width and height."""
+    right, up, back = view.right, view.up, view.back
     light = -0.45 * right - 0.6 * back + 0.66 * up
     light /= np.linalg.norm(light)
-
-    held, reach = (x, r) if frame is None else frame
-    low = np.array([min(held @ right - reach), min(held @ up - reach)])
-    high = np.array([max(held @ right + reach), max(held @ up + reach)])
-    scale = pixels / (high[0] - low[0])
-    width, height = np.ceil((high - low) * scale).astype(int) + 1
-    u, v, d = x @ right, x @ up, x @ back
-    depth = np.full((height, width), np.inf)
-    image = np.zeros((height, width, 4))
-    for k in np.argsort(d):  # the nearest first: what it hides need not be shaded
-        c = (np.array([u[k], v[k]]) - low) * scale
-        radius = r[k] * scale
-        i0, j0 = np.maximum(np.floor(c - radius).astype(int), 0)
-        i1, j1 = np.minimum(np.ceil(c + radius).astype(int) + 1, (width, height))
-        if (d[k] - r[k] >= depth[j0:j1, i0:i1]).all():
+    width, height, scale = view.width, view.height, view.scale
+    centre = (np.column_stack([x @ right, x @ up]) - view.low) * scale
+    radius, d = r * scale, x @ back
+    first = np.maximum(np.floor(centre - radius[:, None]).astype(int), 0)
+    end = np.minimum(np.ceil(centre + radius[:, None]).astype(int) + 1, (width, height))
+    columns, rows = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)[:, None]
+    depth, owner = np.full((height, width), np.inf, np.float32), np.full((height, width), -1, np.int32)
+    for k in np.argsort(d - r):  # the nearest first: what it hides is left out
+        (i0, j0), (i1, j1) = first[k], end[k]
+        before = depth[j0:j1, i0:i1]
+        if not (d[k] - r[k] < before).any():
             continue
-        i, j = np.meshgrid(np.arange(i0, i1), np.arange(j0, j1))
-        nu, nv = (i - c[0]) / radius, (j - c[1]) / radius
-        inside = nu**2 + nv**2 < 1
-        nd = np.sqrt(np.where(inside, 1 - nu**2 - nv**2, 0))  # towards the eye
-        z = d[k] - r[k] * nd
-        shown = inside & (z < depth[j, i])
-        i, j, z, nu, nv, nd = (q[shown] for q in (i, j, z, nu, nv, nd))
-        depth[j, i] = z
-        shine = np.clip(nu * (light @ right) + nv * (light @ up) - nd * (light @ back), 0, 1)
-        image[j, i, :3] = colour[k, :3] * (0.38 + 0.67 * shine)[:, None] + 0.25 * shine[:, None]**24
-        image[j, i, 3] = 1
+        off = radius[k]**2 - (columns[i0:i1] - centre[k, 0])**2 - (rows[j0:j1] - centre[k, 1])**2
+        z = d[k] - np.sqrt(np.maximum(off, 0)) / scale
+        shown = (off > 0) & (z < before)
+        np.copyto(before, z, where=shown)
+        np.copyto(owner[j0:j1, i0:i1], k, where=shown)
+
+    image = np.zeros((height, width, 4), np.float32)
+    seen = owner >= 0
+    j, i = np.nonzero(seen)
+    k = owner[seen]
+    nu, nv = (i - centre[k, 0]) / radius[k], (j - centre[k, 1]) / radius[k]
+    nd = (d[k] - depth[seen]) / r[k]  # towards the eye
+    shine = np.clip(nu * (light @ right) + nv * (light @ up) - nd * (light @ back), 0, 1)
+    shade = colour[k, :3] * (0.38 + 0.67 * shine)[:, None] + 0.25 * shine[:, None]**24
 
     # Hollows are darker than what stands out.
-    seen = np.isfinite(depth)
     if seen.any():
         near = np.where(seen, depth, depth[seen].max())
         hollow = np.clip((near - blurred(near, int(2 * r.mean() * scale))) / r.mean(), 0, 1.5)
-        image[..., :3] *= (1 - 0.35 * hollow)[..., None]
-    image = np.clip(image[: height // 2 * 2, : width // 2 * 2], 0, 1)  # then two by two into one
-    image = sum(image[a::2, b::2] for a in (0, 1) for b in (0, 1)) / 4
+        shade *= (1 - 0.35 * hollow[seen])[:, None]
+    image[seen, :3], image[seen, 3] = np.clip(shade, 0, 1), 1
+    image = sum(image[a::2, b::2] for a in (0, 1) for b in (0, 1)) / 4  # two by two into one
     image[..., :3] /= np.maximum(image[..., 3:], 0.25)  # a rim is transparent, not dark
-    image = image[::-1]
+    return image[::-1]
 
-    def place(point):
-        return (point @ right - low[0]) * scale / 2, len(image) - (point @ up - low[1]) * scale / 2
 
-    return image, place
+def render(x, r, colour, azimuth=-28, elevation=22, pixels=1100, frame=None):
+    """Spheres as draw() has them, in a view that just holds them; frame: or these centres and radii, if others than x and r.
+
+    Returns an RGBA image, and a function from places (m) to its pixels."""
+    view = View(*((x, r) if frame is None else frame), azimuth, elevation, pixels)
+    return draw(x, r, colour, view), view.place

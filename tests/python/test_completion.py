@@ -20,7 +20,7 @@ printf '%s\\n' "${{COMPREPLY[@]}}\""""
 
 
 def test_commands():
-    assert {"run", "sweep", "watch", "figures", "reproduce", "test"} <= set(complete(""))
+    assert {"run", "sweep", "watch", "figures", "movie", "view", "reproduce", "test"} <= set(complete(""))
     assert complete("wa") == ["watch"]
 
 
@@ -29,6 +29,8 @@ def test_commands():
     ("export", "--format --output --help"),
     ("watch", "--interval --once --time --png --no-png --help"),
     ("figures", "--output --format --only --help"),
+    ("movie", "--only --stage --fps --size --output --help"),
+    ("view", "--stage --every --most --output --help"),
     ("reproduce", "--preset --seeds --quick --set --settled --output --cores --gpu --cluster --cluster-options --dry-run --help"),
 ])
 def test_options(command, options):
@@ -42,6 +44,7 @@ def test_cases():
 def test_values_of_options():
     assert complete("reproduce", "--preset", "") == ["paper", "standard", "fast"]
     assert complete("watch", "--interval", "") == complete("figures", "--format", "") == []
+    assert complete("movie", "--only", "") == ["grains", "section"] and complete("figures", "--only", "") == []
     assert complete("export", "--format", "") == ["csv", "lammps", "vtk"]
     assert complete("watch", "--png", "READ") == ["README.md"]
 
