@@ -29,7 +29,8 @@ constexpr std::string_view overview_text =
 constexpr std::string_view overview = overview_text.substr(1);  // without the first end of line
 
 // Those of the script ./moraine, see there.
-const std::vector<std::string> launcher_commands = {"watch", "figures", "report", "reproduce", "docs", "test"};
+const std::vector<std::string> launcher_commands = {"watch",     "figures", "report",
+                                                    "reproduce", "docs",    "test"};
 
 std::string did_you_mean(const std::string& word, const std::vector<std::string>& known) {
   std::string near = cases::nearest(word, known);
@@ -141,7 +142,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
 
   CLI::App* replay = app.add_subcommand(
-      "replay", "run a case anew with the loads that were changed from outside, in CASE/replay, and compare all bits");
+      "replay",
+      "run a case anew with the loads that were changed from outside, in CASE/replay, and compare all bits");
   takes_case(replay);
   writes_results(replay);
 
