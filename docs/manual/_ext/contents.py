@@ -206,7 +206,7 @@ def modules():
 
 def api():
     def page(name):
-        more = "   :inherited-members:\n" if name == "case" else ""  # calls for stages are made from the table of keys
+        more = "   :inherited-members: str, Mapping, object\n   :exclude-members: Text\n" if name == "case" else ""  # calls for stages are made from the table of keys
         return f"(module-{name})=\n## moraine.{name}\n\n```{{eval-rst}}\n.. automodule:: moraine.{name}\n{more}```"
     return "\n\n".join(page(name) for name in modules()[0])
 
