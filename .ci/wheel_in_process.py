@@ -14,7 +14,7 @@ else:
 import numpy as np
 import moraine
 
-with moraine.Run(case, force=True, set={"stage.settle.duration": "4 ms"}) as run:
+with moraine.Run(case, force=True, set={"stage.settle.duration": "0.4 s"}) as run:
     assert run.step(50) == 50
     height = run.positions[:, 2].mean()
     run.checkpoint()

@@ -120,6 +120,7 @@ def test_control_c_leaves_a_checkpoint_and_the_run_goes_on(bed):
     with moraine.Run(whole) as run:
         run.finish(progress=False)
     run = moraine.Run(cut)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's job in the background ignores it
     timer = threading.Timer(0.05, lambda: os.kill(os.getpid(), signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt):
