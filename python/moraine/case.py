@@ -87,10 +87,13 @@ class Case(CaseKeys):
             why = "says something else than this case" if self._known is None else "has changed since it was read or written"
             raise Error(f"{self.file}: {why}; moraine.Case({str(self._directory)!r}) reads it, write(overwrite=True) replaces it")
         if there != text:
-            self._directory.mkdir(parents=True, exist_ok=True)
-            aside = self.file.with_name("case.toml.part")
-            aside.write_text(text)
-            os.replace(aside, self.file)
+            try:
+                self._directory.mkdir(parents=True, exist_ok=True)
+                aside = self.file.with_name("case.toml.part")
+                aside.write_text(text)
+                os.replace(aside, self.file)
+            except OSError as why:
+                raise Error(f"{self.file}: cannot be written: {why}") from None
         self._known = _written[self.file] = text
         return self
 

@@ -11,6 +11,7 @@ The bits are those of `moraine run`. Results go to CASE/output as they do there,
 """
 from __future__ import annotations
 
+import operator
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -43,8 +44,9 @@ class Run:
                  threads: int = 0, resume: bool = False, force: bool = False, keep_events: bool = True):
         self.directory = Path(directory)
         pairs = [(key, _text(value)) for key, value in (set or {}).items()]
-        self._run = _core.Run(self.directory, pairs, backend, threads, resume, force, not keep_events)
+        self._run = _core.Run(self.directory.absolute(), pairs, backend, threads, resume, force, not keep_events)
         self._callbacks: list[tuple[int, Callable[[Run], object]]] = []
+        self._calling = False
 
     # Steps.
 
@@ -55,8 +57,10 @@ class Run:
         water a run stops at steps at which grains and water meet, so it may go some steps further. Callbacks are called on the way.
         Control-C writes a checkpoint and raises KeyboardInterrupt; the run may then go on.
         """
-        if steps < 0:
-            raise Error(f"step({steps}): expected 0 steps or more")
+        steps = _count("step", steps, "0 steps")
+        if self._calling:
+            raise Error("step: called from a callback of this run, which is in the middle of a step; expected it after that")
+        self._run.begin_stage()  # where an interrupted one has ended
         first, stage, done = self.step_number, self.stage_index, 0
         while done < steps and not self.finished and self.stage_index == stage:
             at = first + done
@@ -84,14 +88,21 @@ class Run:
         It may read everything, and change loads with `set`. It is not called when a stage begins. What it raises ends the step that it is
         called from; the run stays open.
         """
-        if steps < 1:
-            raise Error(f"every({steps}): expected 1 step or more")
-        self._callbacks.append((steps, callback))
+        if not callable(callback):
+            raise Error(f"every({steps}, {callback!r}): expected a function that takes the run")
+        self._callbacks.append((_count("every", steps, "1 step"), callback))
 
     def _call(self, before: int, now: int) -> None:
-        for every, callback in self._callbacks:
-            if now // every > before // every:
-                callback(self)
+        self._calling = True
+        try:
+            for every, callback in list(self._callbacks):  # one may add another
+                if now // every > before // every:
+                    callback(self)
+        except KeyboardInterrupt:  # as in the steps themselves
+            self.checkpoint()
+            raise
+        finally:
+            self._calling = False
 
     def set(self, load: str, value: Value) -> None:
         """From this step on a load is another: normal_stress, shear_stress (Pa), velocity (of the top layer, m/s), top_pressure or
@@ -232,12 +243,25 @@ class Run:
         return f"Run({str(self.directory)!r}: stage {self.stage}, step {self.step_number} of {self.steps})"
 
 
+def _count(call: str, value: int, least: str) -> int:
+    """A number of steps, at least so many."""
+    try:
+        number = operator.index(value)  # also of NumPy
+    except TypeError:
+        number = -1
+    if number < int(least.split()[0]):
+        raise Error(f"{call}({value!r}): expected {least} or more, a whole number")
+    return min(number, 2**62)
+
+
 def _text(value: Value) -> str:
     """As `--set` takes it."""
+    if hasattr(value, "tolist"):  # of NumPy
+        value = value.tolist()
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
-        return repr(float(value))  # NumPy's as well
+        return repr(value)
     return str(value)
 
 

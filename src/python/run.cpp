@@ -86,9 +86,17 @@ class Run {
     return true;
   }
 
+  // While it lives no other call gets at the runner: other threads run, and signals' handlers.
+  struct Busy {
+    bool& busy;
+    explicit Busy(bool& b) : busy(b) { busy = true; }
+    ~Busy() { busy = false; }
+  };
+
   template <class Action>
   auto guarded(Action&& action) {
     runner();  // or it is closed
+    const Busy alone(busy_);
     try {
       const nb::gil_scoped_release other_threads_may_run;
       return action();
@@ -119,40 +127,52 @@ class Run {
     const nb::gil_scoped_release other_threads_may_run;
     const cases::Case c = cases::load(directory, options.overrides);
     runner_.emplace(options, c);
+    if (runner_->stage_ended() && !runner_->finished()) runner_->begin_stage();
   }
 
   std::int64_t step(std::int64_t most) {
     if (most < 0) throw error("step(", most, "): expected 0 steps or more");
     return guarded([&] {
-      const std::int64_t done = runner().step(most);
-      if (runner().stage_ended() && !runner().finished()) runner().begin_stage();
+      const std::int64_t done = runner_->step(most);
+      if (runner_->stage_ended() && !runner_->finished()) runner_->begin_stage();
       return done;
     });
   }
+  // Where the present one has ended, as after an interruption at its last step.
+  void begin_stage() {
+    guarded([&] {
+      if (runner_->stage_ended()) runner_->begin_stage();
+    });
+  }
   void checkpoint() {
-    guarded([&] { runner().checkpoint(); });
+    guarded([&] { runner_->checkpoint(); });
   }
   void set(const std::string& key, const std::string& value) {
     const double number = run::load_value(key, value);
-    guarded([&] { runner().set(key, number); });
+    guarded([&] { runner_->set(key, number); });
   }
   // The results are closed, without a checkpoint of its own.
-  void close() { grains_.reset(), bed_.reset(), runner_.reset(); }
+  void close() {
+    if (runner_) runner();  // or it is busy
+    grains_.reset(), bed_.reset(), runner_.reset();
+  }
 
   Shared grains() {
     forget_the_past();
     if (bed_) return bed_;
     if (!grains_) {
+      const Busy alone(busy_);
       const nb::gil_scoped_release other_threads_may_run;
-      grains_ = std::make_shared<Grains>(Grains{runner().stage().scene, runner().grains()});
+      grains_ = std::make_shared<Grains>(Grains{runner_->stage().scene, runner_->grains()});
     }
     return grains_;
   }
   SharedBed bed() {
     forget_the_past();
     if (!bed_) {
+      const Busy alone(busy_);
       const nb::gil_scoped_release other_threads_may_run;
-      bed_ = std::make_shared<Bed>(Bed{{runner().stage().scene, runner().state()}, runner().water(), {}, {}});
+      bed_ = std::make_shared<Bed>(Bed{{runner_->stage().scene, runner_->state()}, runner_->water(), {}, {}});
     }
     return bed_;
   }
@@ -182,6 +202,10 @@ class Run {
 
   const run::Runner& runner() const {
     if (!runner_) throw error("the run is closed; open it again with resume = True");
+    if (busy_)
+      throw error(
+          "the run is in the middle of another call, of another thread or one that a signal has "
+          "interrupted; expected one call at a time");
     return *runner_;
   }
 
@@ -189,6 +213,7 @@ class Run {
   run::Runner& runner() { return const_cast<run::Runner&>(std::as_const(*this).runner()); }
 
   std::optional<run::Runner> runner_;
+  bool busy_ = false;  // changed and read with the GIL
   std::optional<nb::python_error> raised_;
   Shared grains_;
   SharedBed bed_;
@@ -295,6 +320,7 @@ void bind_run(nb::module_& m) {
            nb::arg("directory"), nb::arg("set"), nb::arg("backend"), nb::arg("threads"), nb::arg("resume"),
            nb::arg("force"), nb::arg("drop_events"))
       .def("step", &Run::step, nb::arg("most"))
+      .def("begin_stage", &Run::begin_stage)
       .def("checkpoint", &Run::checkpoint)
       .def("set", &Run::set, nb::arg("key"), nb::arg("value"))
       .def("close", &Run::close)

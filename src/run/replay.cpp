@@ -34,11 +34,12 @@ void replay_case(const Options& options) {
   const cases::Case c = cases::load_resolved(options.directory, before.case_text);
   Runner runner(again, c);
   const auto stage = static_cast<std::size_t>(before.stage);
-  while (!runner.finished() && runner.stage_index() < stage) runner.step(runner.steps());
+  while (!runner.finished() && runner.stage_index() < stage)
+    runner.stage_ended() ? runner.begin_stage() : void(runner.step(runner.steps()));
   if (before.finished)
     runner.finish();
   else if (!runner.finished())
-    runner.begin_stage(), runner.step(before.state.step - runner.step_number()), runner.checkpoint();
+    runner.step(before.state.step - runner.step_number()), runner.checkpoint();
 
   const std::string where = runner.files().checkpoint().string() + " and " + original.checkpoint().string();
   if (output::digest_of_file(runner.files().checkpoint()) != output::digest_of_file(original.checkpoint())) {

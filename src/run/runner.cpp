@@ -78,7 +78,11 @@ Runner::Runner(const Options& options, const cases::Case& c)
   lock_.emplace(files_.output);
   const bool resuming = settle_old_output();
   was_finished_ = resuming && now_.finished;
-  if (was_finished_) return;
+  if (was_finished_) {  // what it came to is there to be read
+    stage_ = describe(case_, stage_index(), now_);
+    step_ = now_.state.step, stage_ended_ = true;
+    return;
+  }
   make_directories(files_.snapshots());
   progress_ = std::make_unique<Progress>(files_.log(), resuming, options_.quiet);
   if (!damage_.empty()) progress_->warn("warning: " + damage_);
@@ -130,7 +134,11 @@ void Runner::begin_next_stage() {
 
 void Runner::checkpoint() {
   if (finished()) return;
-  guarded([&] { take_state(), save(); });
+  guarded([&] { take_state(); });
+  if (!guard_->finds_healthy(now_.state))
+    throw error("no checkpoint at step ", done(), " of stage ", stage_.name,
+                ": the guards would stop the run here; the checkpoint before it stays");
+  guarded([&] { save(); });
 }
 
 std::int64_t Runner::steps() const { return last_step(stage_) - stage_.first_step; }
@@ -143,6 +151,10 @@ dem::State Runner::grains() const { return was_finished_ ? now_.state : engine_-
 dem::State Runner::state() const { return was_finished_ ? now_.state : engine_->state(); }
 
 std::optional<coupling::WaterFields> Runner::water() const {
+  if (was_finished_ && stage_.water.present) {
+    Stage stage = stage_;
+    return fill(stage, now_.state, now_.water, /*under_way=*/true)->fields();
+  }
   return water_ ? std::optional(water_->fields()) : std::nullopt;
 }
 
@@ -218,11 +230,13 @@ void Runner::remove_later_snapshots() {
       fs::remove(entry.path());
 }
 
-// Those after the checkpoint are met again at their steps.
+// Those after the checkpoint are met again at their steps; so are all of a run that has lost its checkpoints.
 void Runner::take_events(bool resuming) {
   if (!resuming) {
-    to_come_.assign(options_.events.begin(), options_.events.end());
-    if (!to_come_.empty()) write_events(files_.events(), options_.events);
+    const std::vector<LoadEvent> all =
+        options_.events.empty() && !options_.drop_events ? read_events(files_.events()) : options_.events;
+    to_come_.assign(all.begin(), all.end());
+    if (!all.empty() || Files::holds(files_.events())) write_events(files_.events(), all);
     return;
   }
   const std::vector<LoadEvent> all = read_events(files_.events());
@@ -235,7 +249,7 @@ void Runner::take_events(bool resuming) {
   if (!to_come_.empty())
     progress_->say(
         text("events after the checkpoint, which are met again at their steps: ", to_come_.size()));
-  if (!all.empty() || !now_.events.empty()) write_events(files_.events(), all_events());
+  if (Files::holds(files_.events()) || !now_.events.empty()) write_events(files_.events(), all_events());
 }
 
 void Runner::begin(bool resuming) {

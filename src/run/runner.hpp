@@ -29,7 +29,9 @@ class Interrupted : public Error {
 // What a run leaves in its folder.
 struct Files {
   std::filesystem::path output;
-  bool left_by_a_run() const { return holds(checkpoint()) || holds(checkpoint_before()) || holds(series()); }
+  bool left_by_a_run() const {
+    return holds(checkpoint()) || holds(checkpoint_before()) || holds(series()) || holds(events());
+  }
   std::filesystem::path checkpoint() const { return output / "checkpoint.h5"; }
   std::filesystem::path checkpoint_before() const { return output / "checkpoint.previous.h5"; }
   std::filesystem::path series() const { return output / "series.h5"; }
@@ -57,7 +59,7 @@ class Runner {
   std::int64_t step(std::int64_t most);
   void finish();       // to the end of the case
   void begin_stage();  // the next one, where the present one has ended; of the last nothing
-  void checkpoint();   // now
+  void checkpoint();   // now; throws Error, and the run goes on, where the bed is not fit for it
 
   // From this step on a load is another number (events.hpp). It is recorded, and part of the checkpoint.
   // Throws Error where it is no load of this stage.

@@ -315,3 +315,9 @@ def test_check_says_what_would_run(case):
 def test_stubs_are_those_of_the_table():
     stubs = runpy.run_path(str(root / "python/stubs.py"))
     assert stubs["target"].read_text() == stubs["text"](), "run python/stubs.py"
+
+
+def test_where_nothing_can_be_written(tmp_path):
+    (tmp_path / "file").write_text("")
+    assert "Not a directory" in words(lambda: moraine.Case(tmp_path / "file/bed"))
+    assert "/proc/bed/case.toml: cannot be written" in words(lambda: moraine.Case("/proc/bed").settle("1 s").write())

@@ -145,6 +145,84 @@ def test_what_a_callback_raises_comes_through(bed):
         assert (run.directory / "output/series.h5").exists()
 
 
+def test_a_run_that_is_resumed_where_a_stage_ended_begins_the_next(bed):
+    directory, seen = bed("bed"), []
+    with moraine.Run(directory) as run:
+        while run.stage == "settle":
+            run.step(10000)
+    with moraine.Run(directory, resume=True) as run:  # there is no checkpoint but that of the stage's end
+        assert (run.stage, run.step_number) == ("consolidate", 0)
+        run.set("normal_stress", "3 kPa")
+        run.every(100, lambda run: seen.append(run.step_number))
+        assert run.step(250) == 250
+    assert seen == [100, 200]
+
+
+def test_a_finished_case_can_be_read(bed):
+    directory = bed("bed")
+    with moraine.Run(directory) as run:
+        run.finish(progress=False)
+        known = run.stage, run.kind, run.steps, run.step_number, run.time, run.latest, run.pressures.sum(), repr(run)
+    with moraine.Run(directory, resume=True) as run:
+        assert run.finished and run.step(5) == 0
+        run.finish()
+        assert known == (run.stage, run.kind, run.steps, run.step_number, run.time, run.latest, run.pressures.sum(), repr(run))
+
+
+def test_one_call_at_a_time(bed):
+    run, failures = moraine.Run(bed("bed"), threads=1), []
+    thread = threading.Thread(target=run.finish, kwargs={"progress": False})
+    thread.start()
+    calls = [run.close, run.checkpoint, lambda: run.latest, lambda: run.positions, lambda: run._run.step(1)]
+    while thread.is_alive() and len(failures) < len(calls):
+        try:
+            calls[len(failures)]()
+        except moraine.Error as error:
+            failures.append(str(error))
+    thread.join()
+    assert len(failures) == len(calls) and all("one call at a time" in words for words in failures)
+    assert run.finished
+    run.close()
+
+
+def test_a_run_stays_where_it_is_when_the_directory_changes(bed, tmp_path, monkeypatch):
+    bed("bed")
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path)
+    with moraine.Run("bed") as run:
+        monkeypatch.chdir(tmp_path / "elsewhere")
+        run.step(100)
+        run.checkpoint()
+    monkeypatch.chdir(tmp_path)
+    with moraine.Run("bed", resume=True) as run:
+        assert run.step_number == 100
+
+
+def test_control_c_in_a_callback_leaves_a_checkpoint(bed):
+    directory = bed("bed")
+
+    def interrupt(run):
+        raise KeyboardInterrupt
+
+    with moraine.Run(directory) as run:
+        run.every(100, interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            run.step(1000)
+    with moraine.Run(directory, resume=True) as run:
+        assert run.step_number == 100
+
+
+def test_numbers_of_numpy(bed):
+    with moraine.Run(bed("bed")) as run:
+        seen = []
+        run.every(np.int64(50), lambda run: seen.append(run.step_number))
+        assert run.step(np.int32(100)) == 100 and seen == [50, 100]
+        to_shear(run)
+        run.set("normal_stress", np.array(2500.5))
+        run.set("velocity", np.float32(0.25))
+        assert [value for *_, value in run.events] == [2500.5, 0.25]
+
+
 def test_results_that_are_there_are_not_replaced_unasked(bed):
     directory = bed("bed")
     moraine.Run(directory).close()
@@ -161,6 +239,11 @@ def test_results_that_are_there_are_not_replaced_unasked(bed):
     (lambda run: run.set("gamma_n", 1), ["stays as it is", "normal_stress, velocity"]),
     (lambda run: run.step(-1), ["0 steps or more"]),
     (lambda run: run.every(0, print), ["1 step or more"]),
+    (lambda run: run.every(1.5, print), ["every(1.5)", "a whole number"]),
+    (lambda run: run.every(10, None), ["every(10, None)", "a function"]),
+    (lambda run: run.step(1e3), ["step(1000.0)", "a whole number"]),
+    (lambda run: run.step("many"), ["step('many')", "a whole number"]),
+    (lambda run: (run.every(10, lambda run: run.step(1)), run.step(20)), ["called from a callback"]),
     (lambda run: moraine.Run(run.directory), ["another run is writing here"]),
     (lambda run: moraine.Run(run.directory, resume=True), ["another run is writing here"]),
     (lambda run: moraine.Run(run.directory / "nothing"), ["nothing", "case.toml"]),

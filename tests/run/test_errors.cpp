@@ -372,7 +372,7 @@ TEST_F(Errors, DiskFull) {
   const std::string disk = (small / "output").string();
   // A file system of this process only, so that nothing stays mounted.
   if (::unshare(CLONE_NEWNS) != 0 || ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
-      ::mount("tmpfs", disk.c_str(), "tmpfs", 0, "size=300k") != 0) {
+      ::mount("tmpfs", disk.c_str(), "tmpfs", 0, "size=400k") != 0) {
     GTEST_SKIP() << "no permission to mount a small file system";
   }
   const Outcome o = moraine(to_run(small));

@@ -222,6 +222,58 @@ TEST_F(Steered, WhatIsNotFinishedIsReplayedAsFarAsItCame) {
   expect_error({"replay", bed.string(), "--quiet", "--force"}, {"differ", "from stage 3", "same bits"});
 }
 
+// Less far than the stages before it are long.
+TEST_F(Steered, SoIsAStageThatHasJustBegun) {
+  const fs::path bed = make("bed", by_velocity(small_case()));
+  {
+    run::Runner runner(options(bed), cases::load(bed));
+    while (runner.stage_index() < 2) runner.step(1 << 20), runner.begin_stage();
+    runner.step(100), runner.set("normal_stress", 3000), runner.step(200);
+    runner.checkpoint();
+  }
+  const Outcome replay = moraine({"replay", bed.string(), "--quiet"});
+  EXPECT_EQ(replay.status, 0) << replay.err;
+}
+
+TEST_F(Steered, WhatHasFinishedIsThereToBeRead) {
+  for (const std::string& text : {small_case(), wet_case()}) {
+    const fs::path bed = make("bed", text);
+    run::Runner first(options(bed), cases::load(bed));
+    first.finish();
+    const fs::path copy = bed.parent_path() / "copy";
+    fs::copy(bed, copy, fs::copy_options::recursive);
+    const run::Runner again(resumed(copy), cases::load(copy));
+    EXPECT_TRUE(again.was_finished() && again.stage_ended());
+    EXPECT_EQ(again.stage().name, "shear");
+    EXPECT_EQ(again.done(), first.done());
+    EXPECT_EQ(again.steps(), first.steps());
+    EXPECT_EQ(dem::loads_of(again.stage().scene, again.state()).contacts.size(),
+              dem::loads_of(first.stage().scene, first.state()).contacts.size());
+    ASSERT_EQ(again.water().has_value(), first.water().has_value());
+    if (first.water()) {
+      EXPECT_EQ(again.water()->pressure, first.water()->pressure);
+    }
+    fs::remove_all(bed), fs::remove_all(copy);
+  }
+}
+
+// A run that has lost its checkpoints begins anew, with its events.
+TEST_F(Steered, EventsOfARunWithoutCheckpoints) {
+  const fs::path bed = make("bed", by_velocity(small_case()));
+  {
+    run::Runner runner(options(bed), cases::load(bed));
+    steer(runner);
+  }
+  const std::string events = contents(bed / "output/events.csv");
+  for (const char* name : {"checkpoint.h5", "checkpoint.previous.h5", "series.h5"})
+    fs::remove(bed / "output" / name);
+  expect_says(error_of([&] { run::Runner(options(bed), cases::load(bed)); }), {"holds the results"});
+  run::Runner again(resumed(bed), cases::load(bed));
+  again.finish();
+  EXPECT_EQ(again.events().size(), 4u);
+  EXPECT_EQ(contents(bed / "output/events.csv"), events);
+}
+
 TEST_F(Steered, EventsThatAreDroppedDoNotCome) {
   const std::string text = by_velocity(small_case());
   const fs::path whole = make("whole", text), cut = make("cut", text);
