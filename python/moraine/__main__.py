@@ -30,7 +30,7 @@ def for_program(words):
         return
     if not words:
         overview = subprocess.run([program], check=True, capture_output=True, text=True).stdout
-        print(overview.replace(" watch and figures need the launcher ./moraine.", "").replace("./moraine", "moraine"), end="")
+        print(overview.replace(" watch, figures, movie and view need the launcher ./moraine.", "").replace("./moraine", "moraine"), end="")
         sys.exit(0)
     if words[0] not in ("-h", "--help"):
         os.execv(program, ["moraine", *words])

@@ -204,6 +204,8 @@ def run(args):
     if not shutil.which("ffmpeg"):
         raise MissingData("there is no ffmpeg on the PATH, which makes the movies; install it (Debian: apt-get install ffmpeg)")
     directory = Path(args.output or case.directory / "figures")
+    if directory.exists() and not directory.is_dir():
+        raise MissingData(f"{directory}: is a file; expected a directory for the movies")
     directory.mkdir(parents=True, exist_ok=True)
     for kind in [args.only] if args.only else kinds:
         path = directory / f"{kind}.mp4"

@@ -49,7 +49,8 @@ void replay_case(const Options& options) {
         "; expected the same bits. Has the program, a file that the case reads, or an interval of output "
         "changed since?");
   }
-  std::cout << "the same bits, with " << before.events.size() << " events and " << before.rows.size()
+  std::cout << "the same bits, with " << before.events.size()
+            << (before.events.size() == 1 ? " event and " : " events and ") << before.rows.size()
             << " rows: " << where << "\n";
 }
 
