@@ -85,8 +85,8 @@ class Run:
     def every(self, steps: int, callback: Callable[[Run], object]) -> None:
         """Calls callback(run) at each multiple of so many steps of a stage, or with pore water at the first exchange after it.
 
-        It may read everything, and change loads with `set`. It is not called when a stage begins. What it raises ends the step that it is
-        called from; the run stays open.
+        It may read everything, and change loads with `set`. It is not called when a stage begins, nor at the last step of one that another
+        follows, as that has begun by then. What it raises ends the step that it is called from; the run stays open.
         """
         if not callable(callback):
             raise Error(f"every({steps}, {callback!r}): expected a function that takes the run")
