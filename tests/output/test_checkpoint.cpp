@@ -47,6 +47,7 @@ Checkpoint sample(dem::Index grains) {
   for (dem::Index k = 0; k < grains; ++k) {
     c.rows.push_back(number.row());
     c.snapshots.push_back({"02-shear-" + std::to_string(k) + ".h5", number(), grains, k});
+    c.events.push_back({k % 2, 100 * k, k % 2 ? "velocity" : "normal_stress", number()});
   }
   return c;
 }
@@ -57,7 +58,7 @@ class CheckpointFile : public testing::Test {
     return message([&] { read_checkpoint(path); });
   }
   // As if the file had been written with what now stands in it.
-  void reseal(std::int64_t format = 10) const {
+  void reseal(std::int64_t format = 11) const {
     Aside file(path);
     file.write(contents(path));
     seal(file, "checkpoint", format);
@@ -220,7 +221,7 @@ TEST_F(CheckpointFile, RefusesAnotherFormat) {
   reseal(1000);
   EXPECT_EQ(
       why_not(),
-      path.string() + ": written by a later version of moraine (checkpoint format 1000; this one reads 10)");
+      path.string() + ": written by a later version of moraine (checkpoint format 1000; this one reads 11)");
 
   directory.write("checkpoint.h5", hdf5);  // has lost its seal
   EXPECT_THROW(read_checkpoint(path), Damaged);
@@ -229,13 +230,13 @@ TEST_F(CheckpointFile, RefusesAnotherFormat) {
   EXPECT_TRUE(
       contains(why_not(), path.string() + ": written by an earlier version of moraine (checkpoint format 4"))
       << why_not();
-  EXPECT_TRUE(contains(why_not(), "this one reads 10")) << why_not();
+  EXPECT_TRUE(contains(why_not(), "this one reads 11")) << why_not();
 }
 
 // A checkpoint before it is no help where this version is the wrong one.
 TEST_F(CheckpointFile, CallsOnlyDamageDamage) {
   write_checkpoint(path, sample(2));
-  reseal(11);
+  reseal(12);
   try {
     read_checkpoint(path);
     FAIL();
