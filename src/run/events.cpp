@@ -71,8 +71,6 @@ const std::vector<std::string>& loads_from_outside() {
   return names;
 }
 
-bool is_of_water(const std::string& key) { return key == "top_pressure" || key == "bottom_pressure"; }
-
 double load_value(const std::string& key, const std::string& value) {
   const auto& loads = loads_from_outside();
   const std::string stated = key + " = " + value;

@@ -26,7 +26,6 @@ bool has_load(const cases::Stage& asked, const Stage& stage, const std::string& 
 // From its step on the load is that value; a history that it followed ends there, a sinusoid goes on. Changes
 // the stage's scene, histories and water.
 void apply(const LoadEvent& event, Stage& stage);
-bool is_of_water(const std::string& key);
 
 // events.csv: a line each, "stage,step,key,value" with values in SI. The stage is counted from 1, as in the
 // names of snapshots. What a kill has left of a last line does not count. Throws Error naming file and line.

@@ -491,13 +491,14 @@ void Runner::apply_events() {
 }
 
 void Runner::apply(const LoadEvent& event) {
+  // Loaded anew, as on a restart from a checkpoint of this step: the account of energy up to here is closed
+  // with the load as it was.
+  take_state();
   run::apply(event, stage_);
-  if (is_of_water(event.key)) {
-    take_state();
+  if (water_)
     refill();
-  } else {
-    engine_->redrive(stage_.scene);
-  }
+  else
+    engine_->load(stage_.scene, now_.state);
   now_.scene.bodies = stage_.scene.bodies;
   now_.histories = stage_.histories, now_.water_settings.sides = stage_.water.sides;
   now_.events.push_back(event);

@@ -175,6 +175,33 @@ TEST_F(Steered, EventsComeAgainAfterABreakAndInAReplay) {
   }
 }
 
+// A checkpoint of the very step at which a load then changes, as the clock may ask for one.
+TEST_F(Steered, ACheckpointJustBeforeAChange) {
+  for (const std::string& text : {by_velocity(small_case()), by_velocity(wet_case())}) {
+    const fs::path whole = make("whole", text), cut = make("cut", text);
+    {
+      run::Runner runner(options(whole), cases::load(whole));
+      while (runner.stage_index() < 2) runner.step(1 << 20), runner.begin_stage();
+      runner.step(600), runner.set("normal_stress", 5000);
+      runner.step(600), runner.set("velocity", 0.05);
+      runner.finish();
+    }
+    {
+      run::Runner runner(options(cut), cases::load(cut));
+      while (runner.stage_index() < 2) runner.step(1 << 20), runner.begin_stage();
+      runner.step(600), runner.checkpoint(), runner.set("normal_stress", 5000);
+      runner.step(100);
+    }
+    {
+      run::Runner runner(resumed(cut), cases::load(cut));
+      runner.step(1200 - runner.done()), runner.checkpoint(), runner.set("velocity", 0.05);
+    }
+    run(cut, {}, {"--resume", "--threads", "1"});
+    expect_same_results(whole, cut);
+    fs::remove_all(whole), fs::remove_all(cut);
+  }
+}
+
 TEST_F(Steered, WaterToo) {
   const fs::path whole = make("whole", wet_case()), cut = make("cut", wet_case());
   const auto change = [](run::Runner& runner) {
