@@ -1,12 +1,10 @@
 """Snapshots with known grains and contacts, in the layout of src/output/snapshot.cpp."""
-import sys
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "python"))
-from moraine import Snapshot  # noqa: E402
+from moraine import Snapshot
 
 units = {
     "grains": {"id": "1", "role": "1", "radius": "m", "position": "m", "displacement": "m", "velocity": "m/s", "spin": "rad/s",
